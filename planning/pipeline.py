@@ -9,6 +9,7 @@ from threadpoolctl import threadpool_limits
 
 from geometry.mesh.mesh import TriangleMesh
 from planning.model.document.certificates import CamerasBy
+from planning.model.document.device_records import RingAxis
 from planning.model.errors import InputError
 from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
 from planning.model.progress import TIME_IS_UP, Report, Stopwatch
@@ -34,6 +35,7 @@ from .stages import (
     one_device_more,
     placed,
     polished,
+    with_free_axes,
 )
 
 Keep = Callable[[RigPlan], None]
@@ -56,6 +58,7 @@ def plan_rig(
     region_coverage: float | None = None,
     accuracy_mm: float | None = None,
     up: str | None = None,
+    ring_axis: RingAxis | None = None,
     seed: int = 0,
     threads: int = 2,
     check: bool = True,
@@ -91,6 +94,9 @@ def plan_rig(
             and measured / reachable by cameras, 0 for none; None: the rig's.
         accuracy_mm: Largest standard deviation along the normal [mm]; None: the rig's.
         up: Axis that points up, `z` or `-y` and so on; None: the rig's.
+        ring_axis: Rings `centred` on what each projector lights, with axes `free` to
+            stand where errors are smallest, or `auto`: centred where that takes no
+            more cameras and the check is passed; None: the rig's.
         seed: The same seed gives the same plan.
         threads: Worker threads; no result depends on it.
         check: Whether the plan is audited and reconstructed from pixels.
@@ -127,6 +133,7 @@ def plan_rig(
         region_coverage=region_coverage,
         accuracy_mm=accuracy_mm,
         up=up,
+        ring_axis=ring_axis,
     )
     clock = Stopwatch(progress, time_limit=time_limit)
     # BLAS must not split sums differently with another number of threads.
@@ -141,12 +148,25 @@ def plan_rig(
             mounted=fixed,
             evaluates=evaluates,
         )
-        plan, partial = (_evaluated if evaluates else _planned)(request, clock, keep)
+        planned = _evaluated if evaluates else _planned
+        plan, partial = planned(request, clock, keep)
         if check and not plan.document.truncated:
             plan = _checked(plan, partial, clock, keep)
+            if _axes_may_help(plan, partial):
+                clock.say("  centred ring axes don't pass the check: free ones")
+                freed = replace(request, axis_wanted="free")
+                other = _checked(*planned(freed, clock, keep), clock, keep)
+                plan = other if not missed_by(other, check=True) else plan
     if missed := missed_by(plan, check=check):
         raise RequirementError(plan, missed)
     return plan
+
+
+def _axes_may_help(plan: RigPlan, partial: PartialPlan) -> bool:
+    """Whether centred ring axes weren't asked for, and the check isn't passed."""
+    check = plan.document.reconstruction
+    left = partial.axes == "centred" and partial.request.ring_axis == "auto"
+    return left and check is not None and not check.passed
 
 
 def missed_by(plan: RigPlan, *, check: bool) -> tuple[str, ...]:
@@ -203,7 +223,8 @@ def _planned(
             partial = polished(larger, clock)
             partial = bounded_cameras(partial, clock)
             plan = write_plan(partial, clock)
-            larger = one_device_more(partial, plan, clock)
+            larger = with_free_axes(partial, plan, clock)
+            larger = larger or one_device_more(partial, plan, clock)
             if larger is None:
                 return plan, partial
     except KeyboardInterrupt:

@@ -164,8 +164,8 @@ def _resolve(request: PlanRequest) -> tuple[Requirements, NDArray[np.float64]]:
     if request.mounted is not None:
         requirements = request.mounted.with_rings(requirements)
     for kept in requirements.existing:
-        # One outermost ring for all: that of the rings that stay.
-        outer = kept.ring_radii[-1] if kept.ring_radii else outer
+        # One outermost ring for all, no narrower than rings that stay.
+        outer = max((outer, *kept.ring_radii[-1:]))
     radii = uniform_radii(outer, light.ring_step(gap, rig.standoff_m))
     x, y, z = bearing(mesh, np.array(workspace.axis)).tolist()
     workspace = replace(

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from planning.cameras.axis_choice import other_axes, place_for_axes, standing_axes
 from planning.cameras.camera_cover import (
     CameraCover,
     NothingMeasuredError,
@@ -13,10 +14,11 @@ from planning.cameras.camera_cover import (
     measured_of,
 )
 from planning.cameras.camera_routes import widest_route
-from planning.cameras.camera_stage import follow_cameras, place_cameras
+from planning.cameras.camera_stage import CameraSolution, follow_cameras
 from planning.cameras.proved_cameras import CameraStage, bound_stage
 from planning.model.device_poses import moved_to
 from planning.model.document.certificates import Certificate
+from planning.model.document.device_records import RingAxis
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedProjector
@@ -36,11 +38,9 @@ from planning.report.advice.projector_relaxations import nothing_lit
 from planning.report.advice.standing_inside import standing_inside
 from planning.report.advice.what_helps import falls_short
 from planning.report.partial_plan import PartialPlan, Prepared
-from planning.rings.axis_moves import move_ring_axes
 from planning.rings.ring_stage import space_rings
 from planning.scene.camera_views import CandidateViews
 from planning.scene.draws import DRAWS
-from planning.scene.measured import lit_samples
 from planning.scene.placed_bodies import existing_devices
 
 from .proofs import camera_bound, projector_bound
@@ -76,8 +76,15 @@ def bounded_projectors(
     return stage
 
 
-def placed(ready: Prepared, stage: ProjectorStage, clock: Stopwatch) -> PartialPlan:
+def placed(
+    ready: Prepared,
+    stage: ProjectorStage,
+    clock: Stopwatch,
+    axis: RingAxis | None = None,
+) -> PartialPlan:
     """Return poses of widest margin for chosen projectors, and the cameras for them.
+
+    Ring axes stand as was asked, or else as given.
 
     Raises:
         InfeasibleLimitsError: If no camera measures any lit sample.
@@ -89,14 +96,28 @@ def placed(ready: Prepared, stage: ProjectorStage, clock: Stopwatch) -> PartialP
         scene = ready.scene.among(projectors)
         views = camera_candidate_views(scene, ready.camera, request.rig.n_camera_poses)
         try:
-            solution = place_cameras(scene, projectors, views, request.cameras_by)
+            solution = place_for_axes(
+                scene,
+                projectors,
+                views,
+                request.cameras_by,
+                axis=axis or request.ring_axis,
+                margin=request.ring_margin,
+            )
         except NothingMeasuredError as error:
             helps = nothing_measured(scene, request.rig, error)
             helps += standing_inside(scene, error.cameras)
             raise InfeasibleLimitsError(f"{error}; {helps}") from None
         cameras = solution.stage
         _say_count(cameras, cameras.cameras, clock)
-    return PartialPlan(ready, stage, solution.projectors, cameras, cameras.cameras)
+    return PartialPlan(
+        ready,
+        stage,
+        solution.projectors,
+        cameras,
+        cameras.cameras,
+        axes=solution.axes,
+    )
 
 
 def _say_count(
@@ -125,23 +146,38 @@ def polished(partial: PartialPlan, clock: Stopwatch) -> PartialPlan:
             )
     with clock.stage("rings", "rings: axes and radii for the surface and the cameras"):
         scene, request = partial.scene, partial.request
-        final = follow_cameras(
-            scene, partial.projectors, moved.cameras, stage, request.cameras_by
-        )
+        final = CameraSolution(partial.projectors, stage, partial.axes)
+        if partial.axes == "free":
+            final = follow_cameras(
+                scene, partial.projectors, moved.cameras, stage, request.cameras_by
+            )
         rings = space_rings(
             scene.among((*final.projectors, *moved.cameras)),
             final.projectors,
             moved.cameras,
-            request.rig.ring_spacing,
+            request.rig.rings.spacing,
             final.stage.cover.samples,
+            margin=request.ring_margin,
         )
-    return replace(
-        partial,
-        projectors=final.projectors,
-        camera_stage=final.stage,
-        cameras=moved.cameras,
-        rings=rings,
-    )
+        partial = replace(
+            partial,
+            projectors=final.projectors,
+            camera_stage=final.stage,
+            cameras=moved.cameras,
+            rings=rings,
+        )
+        if request.ring_axis != "auto":
+            return partial
+        return replace(
+            partial,
+            other_axes=other_axes(
+                scene,
+                final,
+                moved.cameras,
+                partial.ready.template,
+                request.ring_margin,
+            ),
+        )
 
 
 def bounded_cameras(partial: PartialPlan, clock: Stopwatch) -> PartialPlan:
@@ -158,6 +194,22 @@ def bounded_cameras(partial: PartialPlan, clock: Stopwatch) -> PartialPlan:
         stage = bound_stage(partial.scene, stage, request.rig.camera_device(), effort)
         clock.say(f"  cameras: {_bound_words(stage.certificate)}")
     return replace(partial, camera_stage=stage)
+
+
+def with_free_axes(
+    partial: PartialPlan, plan: RigPlan, clock: Stopwatch
+) -> PartialPlan | None:
+    """Cameras for free ring axes, where centred ones were tried and measure too little.
+
+    None where that was asked for, or enough is measured.
+    """
+    areas, left = plan.coverage.target, partial.request.ring_axis == "auto"
+    measured, reachable = areas.measured_m2, areas.reachable_by_cameras_m2
+    short = falls_short(measured, reachable, plan.requirements.coverage)
+    if not (left and partial.axes == "centred" and short):
+        return None
+    clock.say("  centred ring axes fall short: free ones")
+    return placed(partial.ready, partial.stage, clock, "free")
 
 
 def one_device_more(
@@ -206,8 +258,10 @@ def as_they_stand(ready: Prepared, clock: Stopwatch) -> PartialPlan:
     with clock.stage("cameras", "cameras: what they measure as they stand"):
         cameras = views.cameras[: len(scene.requirements.existing_of("camera"))]
         target = scene.target_samples(DRAWS.cameras)
-        lit = lit_samples(scene, projectors, target)
-        projectors = move_ring_axes(scene, projectors, cameras, lit)
+        asked, margin = request.ring_axis, request.ring_margin
+        projectors, axes = standing_axes(
+            scene, projectors, views, target, axis=asked, margin=margin
+        )
         samples, measured = measured_of(scene, projectors, views, target)
         cover = candidate_cover(scene, measured)
         proof = unproved(cover, target.samples.weight)
@@ -218,9 +272,11 @@ def as_they_stand(ready: Prepared, clock: Stopwatch) -> PartialPlan:
             CameraCover(views, samples, measured, _standing(cover)),
         )
     with clock.stage("rings", "rings: radii for the surface and the cameras"):
-        spacing = request.rig.ring_spacing
-        rings = space_rings(scene, projectors, cameras, spacing, samples)
-    return PartialPlan(ready, stage, projectors, camera_stage, cameras, rings=rings)
+        spacing = request.rig.rings.spacing
+        rings = space_rings(scene, projectors, cameras, spacing, samples, margin=margin)
+    return PartialPlan(
+        ready, stage, projectors, camera_stage, cameras, axes=axes, rings=rings
+    )
 
 
 def _offered(ready: Prepared) -> tuple[tuple[PlannedProjector, ...], CandidateViews]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planning.model.document.certificates import CamerasBy, Certificate
+from planning.model.document.device_records import AxisTaken
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.selection import Selection
 from planning.rings.axis_moves import move_ring_axes
@@ -27,6 +28,7 @@ class CameraSolution:
 
     projectors: tuple[PlannedProjector, ...]
     stage: CameraStage
+    axes: AxisTaken = "free"
 
 
 def place_cameras(
@@ -34,13 +36,15 @@ def place_cameras(
     projectors: tuple[PlannedProjector, ...],
     candidates: CandidateViews,
     by: CamerasBy = "both",
+    axes: AxisTaken = "free",
 ) -> CameraSolution:
-    """Choose cameras, move the ring axes for them, and see which route is better."""
-    cover = cover_for(scene, projectors, candidates, by)
-    moved, cover = move_axes(scene, projectors, cover, by)
+    """Choose cameras, move free ring axes for them, and see which route is better."""
+    cover, moved = cover_for(scene, projectors, candidates, by), projectors
+    if axes == "free":
+        moved, cover = move_axes(scene, projectors, cover, by)
     cover, routes, rival = better_route(scene, moved, cover, by)
     stage = replace(camera_stage(scene, cover, routes), rival=rival)
-    return CameraSolution(moved, stage)
+    return CameraSolution(moved, stage, axes)
 
 
 def move_axes(

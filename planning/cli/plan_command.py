@@ -34,6 +34,7 @@ _ASKED = (
     "region_coverage",
     "accuracy_mm",
     "up",
+    "ring_axis",
     "seed",
     "prove",
     "cameras_by",

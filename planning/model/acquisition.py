@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from .planned import PlannedCamera, PlannedProjector
+from .planned import PlannedCamera, PlannedProjector, code_bits
 
 # Quotients of rates that are whole but for rounding are whole.
 _ROUNDING = 1e-9
@@ -17,7 +17,7 @@ def n_frames(projectors: Sequence[PlannedProjector], n_cameras: int) -> int:
 
         sum_p (2 + 2 ceil(log2(n_rings + 1)) + 2 n_cameras)
     """
-    bits = (len(projector.ring_radii).bit_length() for projector in projectors)
+    bits = (code_bits(len(projector.ring_radii)) for projector in projectors)
     return sum(2 + 2 * bit + 2 * n_cameras for bit in bits)
 
 

@@ -39,6 +39,11 @@ class PlannedProjector:
     keeps_rings: bool = False
 
 
+def code_bits(n_rings: int) -> int:
+    """Return how many bits number the annuli that so many rings part."""
+    return max(1, n_rings.bit_length())
+
+
 @dataclass(frozen=True, eq=False)
 class PlannedCamera:
     """One camera of a plan.

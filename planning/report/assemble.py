@@ -76,6 +76,7 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
         regions=regions,
         projectors=entries.projector_records(among, devices, partial.rings, claims),
         cameras=entries.camera_records(among, devices.cameras, claims),
+        ring_axes=entries.axes_record(among, partial, devices, claims),
         coverage=coverage,
         overlaps=overlaps,
         firing_schedule=schedule,

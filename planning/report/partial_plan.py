@@ -6,6 +6,7 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.regions.regions import DominantRegions
 from planning.cameras.proved_cameras import CameraStage
 from planning.model.document.certificates import CamerasBy
+from planning.model.document.device_records import AxisTaken, RingAxis
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.projectors.projector_stage import ProjectorStage
 from planning.rig.mounted import Mounted
@@ -14,6 +15,7 @@ from planning.rig.rig import Rig
 from planning.rig.wishes import Wishes
 from planning.rings.ring_stage import RingStage
 from planning.scene.interest import Interest
+from planning.scene.lights import light_of
 from planning.scene.ranges.ranged_body import RangedBody
 from planning.scene.scene import Scene
 
@@ -29,6 +31,7 @@ class PlanRequest:
         mounted: Devices that stay, which the rig holds already; None: none but those
             of its file.
         evaluates: Whether these are all there will be.
+        axis_wanted: Where ring axes stand after all; None: as was asked.
     """
 
     mesh: TriangleMesh
@@ -43,6 +46,18 @@ class PlanRequest:
     cameras_by: CamerasBy = "both"
     mounted: Mounted | None = None
     evaluates: bool = False
+    axis_wanted: RingAxis | None = None
+
+    @property
+    def ring_axis(self) -> RingAxis:
+        """Where ring axes may stand."""
+        return self.axis_wanted or self.wishes.ring_axis or self.rig.rings.axis
+
+    @property
+    def ring_margin(self) -> float:
+        """How far beside the object rings are projected, in the unit of radii."""
+        light = light_of(self.rig.projector_device())
+        return light.ring_step(1e-3 * self.rig.rings.margin_mm, self.rig.standoff_m)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +82,8 @@ class Prepared:
 class PartialPlan:
     """All stages as far as they came; enough to write a plan from.
 
-    `projectors` have evenly spaced rings; `rings` holds those that cameras let finer.
+    `projectors` have evenly spaced rings about `axes`; `rings` holds those that cameras
+    let finer. `other_axes` are the projectors with other axes, to compare.
     """
 
     ready: Prepared
@@ -75,8 +91,10 @@ class PartialPlan:
     projectors: tuple[PlannedProjector, ...]
     camera_stage: CameraStage
     cameras: tuple[PlannedCamera, ...]
+    axes: AxisTaken = "free"
     truncated: bool = False
     rings: RingStage | None = None
+    other_axes: tuple[PlannedProjector, ...] = ()
 
     @property
     def request(self) -> PlanRequest:

@@ -29,7 +29,7 @@ from .obstacle_tables import obstacles_of
 from .rig_devices import device_document, parallel_device, pinhole_device
 from .rig_files import read_rig, rig_folder
 from .rig_requirements import build_requirements, build_workspace
-from .rig_tables import ParallelTable, PinholeTable, RigTable
+from .rig_tables import ParallelTable, PinholeTable, RigTable, RingsTable
 from .wishes import Wishes
 
 Light = Literal["diverging", "parallel"]
@@ -91,15 +91,15 @@ class Rig:
         return light_of(self._projector).ring_offset(tilt, self.standoff_m)
 
     @property
-    def ring_gap_m(self) -> float | None:
-        """Distance of neighbouring rings at the standoff in [m]; None: not fixed."""
-        gap = self.table.rings.gap_mm
-        return None if gap is None else gap * 1e-3
+    def rings(self) -> RingsTable:
+        """The ring pattern as written."""
+        return self.table.rings
 
     @property
-    def ring_spacing(self) -> Literal["uniform", "curvature"]:
-        """Whether rings are evenly spaced, or finer where the surface bends."""
-        return self.table.rings.spacing
+    def ring_gap_m(self) -> float | None:
+        """Distance of neighbouring rings at the standoff in [m]; None: not fixed."""
+        gap = self.rings.gap_mm
+        return None if gap is None else gap * 1e-3
 
     @property
     def n_projector_poses(self) -> int:
@@ -260,7 +260,9 @@ class Rig:
                 "shift_m": None,
                 light_of(self._projector).offset_key: self.ring_offset,
                 "gap_m": self.ring_gap_m,
-                "spacing": self.ring_spacing,
+                "spacing": self.rings.spacing,
+                "axis": self.rings.axis,
+                "margin_m": self.rings.margin_mm * 1e-3,
                 "outer_radius": self.outer_ring_radius(),
             },
             "workspace": table.workspace.to_document(),

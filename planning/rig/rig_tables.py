@@ -9,6 +9,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from planning.model.bodies import BodyTable, MountTable
+from planning.model.document.device_records import RingAxis
 from planning.model.table_types import (
     Acute,
     Limit,
@@ -165,6 +166,8 @@ class RingsTable(Table):
     tilt_deg: Annotated[float, Field(ge=0.0, lt=45.0)] = 8.0
     gap_mm: Annotated[float, Field(ge=0.01)] | None = None
     spacing: Literal["uniform", "curvature"] = "curvature"
+    axis: RingAxis = "free"
+    margin_mm: Annotated[float, Field(ge=0.0)] = 15.0
 
 
 class LimitsTable(Table):

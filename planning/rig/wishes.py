@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from planning.model.document.device_records import RingAxis
+
 Pattern = Literal["rings", "dense", "none"]
 TargetName = Literal["dominant", "surface"]
 
@@ -25,3 +27,4 @@ class Wishes:
     region_coverage: float | None = None
     accuracy_mm: float | None = None
     up: str | None = None
+    ring_axis: RingAxis | None = None

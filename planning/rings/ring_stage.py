@@ -15,8 +15,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.device_poses import DECIMALS
 from planning.model.document.device_records import CreasesRecord, RingsRecord
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.planned import PlannedCamera, PlannedProjector, code_bits
 from planning.model.requirements import Requirements
 from planning.scene.camera_views import view_of
 from planning.scene.draws import DRAWS
@@ -26,6 +27,7 @@ from planning.scene.patterns import pattern_of
 from planning.scene.samples import merged
 from planning.scene.scene import Scene
 
+from .idle_rings import idle_rings
 from .ring_creases import Creases, crease_errors, find_creases
 from .ring_limits import RingBeam, ring_beam
 from .ring_pitch import best_pitch, users
@@ -61,11 +63,14 @@ def space_rings(
     cameras: Sequence[PlannedCamera],
     spacing: Spacing,
     proved: LitSamples | None = None,
+    *,
+    margin: float = np.inf,
 ) -> RingStage:
     """Return the projectors with rings spaced for the surface and the cameras.
 
     A projector keeps its even rings where others would lose a measured sample. Those
-    that keep their rings are reported on.
+    that keep their rings are reported on. Rings that would light nothing, though the
+    object stood a margin aside, in the unit of radii, are left out.
 
     Where `spacing` is `uniform` rings stay, and are reported on. Fewer cameras were
     proved too few for the samples `proved`.
@@ -89,7 +94,17 @@ def space_rings(
         )
         for p, beam in enumerate(beams)
     )
-    return RingStage(final, tuple(p.ring_radii for p in even), records)
+    shown, parts = list(final), list(records)
+    for p, beam in enumerate(beams):
+        idle = idle_rings(scene, final[p], beam.profile, margin)
+        if idle.any():
+            radii = final[p].ring_radii
+            shown[p] = replace(final[p], ring_radii=radii[~idle])
+            parts[p] = records[p].changed(
+                left_out=tuple(np.round(radii[idle], DECIMALS).tolist())
+            )
+    even_radii = tuple(p.ring_radii for p in even)
+    return RingStage(tuple(shown), even_radii, tuple(parts))
 
 
 def tolerance_m(requirements: Requirements) -> float:
@@ -147,7 +162,9 @@ def _spaced_for(
     """A projector with the rings that limits let it have, unless its own stay."""
     if projector.keeps_rings:
         return projector
-    radii = spaced_radii(limits, len(projector.ring_radii), tolerance_m)
+    # As many as the frames of the even rings tell apart: more of them are free.
+    most = (1 << code_bits(len(projector.ring_radii))) - 1
+    radii = spaced_radii(limits, most, tolerance_m)
     return replace(projector, ring_radii=radii)
 
 

@@ -16,6 +16,8 @@ from planning.rig.rig import load_rig
 from planning.rig.wishes import Wishes
 from planning.rings import ring_pitch
 from planning.rings.beam_profile import cast_beam
+from planning.rings.centred_axes import centred_axes
+from planning.rings.idle_rings import without_idle
 from planning.rings.ring_creases import crease_errors, find_creases
 from planning.rings.ring_limits import ring_beam
 from planning.rings.ring_pitch import best_pitch, projector_gaps, widest_gap
@@ -218,6 +220,71 @@ def test_a_shifted_ring_lands_on_the_ball_for_an_arc():
     shares = ring_shares(scene, replace(projector, ring_radii=radii), cameras)
     arc = np.arccos((radii**2 + d**2 - RADIUS**2) / (2.0 * radii * d)) / np.pi
     assert shares.on_object == pytest.approx(arc, abs=4e-3)
+
+
+def test_rings_that_miss_the_ball_are_left_out(bench):
+    """The ball reaches from d - a to d + a of an axis d aside; a margin goes on top."""
+    scene, projector, cameras = bench
+    d, unit = AWAY * np.tan(np.deg2rad(8.0)), 1.0
+    inner, outer = d - RADIUS, d + RADIUS
+    if projector.light == "diverging":
+        half, tilt, unit = np.arcsin(RADIUS / AWAY), np.deg2rad(8.0), 1.0 / AWAY
+        inner, outer = np.tan(tilt - half), np.tan(tilt + half)
+    margin, radii = 0.006 * unit, projector.ring_radii
+    stage = space_rings(scene, [projector], cameras, "uniform", margin=margin)
+    shown, left_out = stage.projectors[0].ring_radii, stage.records[0].left_out
+    assert np.allclose(np.sort([*shown, *left_out]), radii)
+    gap = radii[0]
+    # The band of the first ring ends on the ball, widened; rays stand a quarter apart.
+    assert inner - margin - gap <= shown[0] <= inner - margin + 0.3 * gap
+    assert outer + margin - 0.3 * gap <= shown[-1] <= outer + margin + gap
+    assert len(left_out) >= 2
+    assert np.array_equal(stage.even_radii[0], radii)
+
+
+def test_kept_rings_and_a_beam_that_misses_leave_nothing_out():
+    scene, projector, _ = made("parallel", tilt_deg=8.0)
+    kept = replace(projector, keeps_rings=True)
+    assert len(without_idle(scene, kept, 0.0).ring_radii) == len(projector.ring_radii)
+    away = replace(projector, ring_radii=np.array([0.01, 0.02, 0.03]))
+    assert len(without_idle(scene, away, 0.0).ring_radii) == 3
+
+
+def test_a_pin_that_rays_miss_keeps_its_ring():
+    """A needle 2 um wide, 0.2 m aside of the axis: only its vertices are met."""
+    ball = sphere(0.05, subdivisions=3)
+    n, x = len(ball.vertices), 0.19
+    pin = [[x, -0.1, 0.0137], [x, 0.0, 0.0137], [x + 2e-6, 0.0, 0.0137]]
+    mesh = TriangleMesh(
+        np.vstack([ball.vertices, pin]), np.vstack([ball.faces, [[n, n + 1, n + 2]]])
+    )
+    scene, projector, _ = made("parallel", mesh=mesh)
+    whole = replace(projector, ring_radii=np.arange(1, 81) * 0.003)
+    shown = without_idle(scene, whole, 0.0).ring_radii
+    coordinate = pattern_of(projector).coordinate(np.array(pin[:1]))[0]
+    assert np.abs(shown - coordinate).min() < 0.003
+    assert len(shown) < 40
+
+
+def test_a_centred_axis_runs_through_the_middle_of_what_is_lit(bench):
+    scene, projector, _ = bench
+    (centred,) = centred_axes(scene, [projector], 0.0)
+    gap = projector.ring_radii[0]
+    reach = RADIUS * np.sin(np.deg2rad(60.0))
+    if projector.light == "diverging":
+        # Incidence is the angle at the ball's centre and the ray's to the axis.
+        ray = np.arcsin(RADIUS / AWAY * np.sin(np.deg2rad(60.0)))
+        reach = np.tan(ray)
+    frame = centred.world_from_ring
+    towards = -frame[:3, 3]
+    off = np.linalg.norm(towards - (towards @ frame[:3, 2]) * frame[:3, 2])
+    assert off < 0.002
+    assert reach - 0.5 * gap <= centred.ring_radii[-1] <= reach + 1.3 * gap
+    assert centred.ring_radii[1] == projector.ring_radii[1]
+    (wider,) = centred_axes(scene, [projector], 3.0 * gap)
+    assert len(wider.ring_radii) == len(centred.ring_radii) + 3
+    kept = replace(projector, keeps_rings=True)
+    assert centred_axes(scene, [kept], 0.0) == (kept,)
 
 
 def test_a_part_of_a_ring_beyond_the_panel_lands_nowhere():

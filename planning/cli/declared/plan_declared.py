@@ -79,6 +79,12 @@ from planning.cli.console import (
     help="What is projected.",
 )
 @click.option(
+    "--ring-axis",
+    type=click.Choice(["centred", "free", "auto"]),
+    help="Circles about the middle of what a projector lights, about axes where errors "
+    "are smallest, or the first where they take no more cameras [default: the rig's].",
+)
+@click.option(
     "--target",
     type=click.Choice(["dominant", "surface"]),
     help="What must be covered [default: dominant; with --ranges surface].",

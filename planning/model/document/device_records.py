@@ -12,6 +12,16 @@ from planning.model.planned import PlannedCamera, PlannedProjector
 from .part import Interval, Matrix3, Part, Pose, Resolution, Vector3
 
 
+def _are_radii(radii: tuple[float, ...]) -> tuple[float, ...]:
+    if len(radii) < 2 or not np.all(np.diff(radii, prepend=0.0) > 0):
+        raise ValueError("must be 2 or more, rising from 0")
+    return radii
+
+
+AxisTaken = Literal["centred", "free"]
+RingAxis = Literal["centred", "free", "auto"]
+
+
 class CreasesRecord(Part):
     """Creases that a projector lights: their length and what rings cut off them."""
 
@@ -29,6 +39,8 @@ class RingsRecord(Part):
         gap_m: Least and largest gap on the object; None: no ring lands on it.
         over_tolerance: Share of chords between rings that err by more than the accuracy
             that was asked for, or than the check's 95th percentile.
+        left_out: Radii of rings that would light nothing of the object, and so aren't
+            projected; `rig.rings.margin_m` is how far aside it may stand.
     """
 
     spacing: Literal["uniform", "curvature", "kept"]
@@ -37,6 +49,37 @@ class RingsRecord(Part):
     gap_m: Interval | None
     over_tolerance: float
     creases: CreasesRecord
+    left_out: tuple[float, ...] = ()
+
+
+class OtherRings(Part):
+    """A projector of the plan with other, evenly spaced rings."""
+
+    id: str
+    world_from_ring: Pose
+    ring_radii: Annotated[tuple[float, ...], AfterValidator(_are_radii)]
+
+
+class OtherAxes(Part):
+    """What the plan's devices would measure of the target with other ring axes."""
+
+    axis: AxisTaken
+    projectors: tuple[OtherRings, ...]
+    measured_m2: float
+
+
+class RingAxes(Part):
+    """Where ring axes stand: as asked, as taken, and what was weighed against it.
+
+    Attributes:
+        asked: By the user, or by the rig.
+        taken: `centred` in the middle of what each projector lights, or `free`.
+        other: None: no other axes were looked at.
+    """
+
+    asked: RingAxis
+    taken: AxisTaken
+    other: OtherAxes | None = None
 
 
 class RingSharesRecord(Part):
@@ -45,12 +88,6 @@ class RingSharesRecord(Part):
     on_object: tuple[float, ...]
     on_target: tuple[float, ...]
     measured: tuple[float, ...]
-
-
-def _are_radii(radii: tuple[float, ...]) -> tuple[float, ...]:
-    if len(radii) < 2 or not np.all(np.diff(radii, prepend=0.0) > 0):
-        raise ValueError("must be 2 or more, rising from 0")
-    return radii
 
 
 class ProjectorRecord(Part):

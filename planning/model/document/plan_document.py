@@ -17,7 +17,7 @@ from .coverage_records import (
     ProjectorMarginal,
     RegionRecord,
 )
-from .device_records import BaselineRow, CameraRecord, ProjectorRecord
+from .device_records import BaselineRow, CameraRecord, ProjectorRecord, RingAxes
 from .input_records import (
     EvaluationRecord,
     MeshRecord,
@@ -84,6 +84,7 @@ class PlanDocument(Part):
     regions: tuple[RegionRecord, ...]
     projectors: tuple[ProjectorRecord, ...]
     cameras: tuple[CameraRecord, ...]
+    ring_axes: RingAxes | None = None
     coverage: Coverage
     overlaps: tuple[Overlap, ...] = ()
     firing_schedule: ExposureSchedule | None = None

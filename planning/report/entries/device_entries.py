@@ -17,7 +17,10 @@ from planning.model.device_poses import DECIMALS, rounded_pose
 from planning.model.document.coverage_records import RegionRecord
 from planning.model.document.device_records import (
     CameraRecord,
+    OtherAxes,
+    OtherRings,
     ProjectorRecord,
+    RingAxes,
     camera_record,
     projector_record,
 )
@@ -29,9 +32,11 @@ from planning.model.document.part import Vector3
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.report.claims import Claims
 from planning.report.judged import Devices
+from planning.report.partial_plan import PartialPlan
 from planning.rings.ring_shares import ring_shares
 from planning.rings.ring_stage import RingStage
 from planning.scene.interest import Interest
+from planning.scene.measured import lit_samples, measured_by
 from planning.scene.placed_bodies import Device
 from planning.scene.scene import Scene
 from planning.scene.workspace.mount_settings import device_from_mount
@@ -84,6 +89,32 @@ def projector_records(
         )
         for p, projector in enumerate(devices.projectors)
     )
+
+
+def axes_record(
+    scene: Scene, partial: PartialPlan, devices: Devices, claims: Claims
+) -> RingAxes:
+    """Return `ring_axes`: what was asked and taken, and what others would measure."""
+    request, other = partial.request, None
+    if partial.other_axes:
+        pairs = zip(partial.other_axes, devices.projectors, strict=True)
+        turned = [rounded_projector(p, planned.id) for p, planned in pairs]
+        samples = lit_samples(scene, turned, claims.target_samples)
+        measured = measured_by(scene, devices.cameras, samples).any(axis=1)
+        other = OtherAxes(
+            axis="free" if partial.axes == "centred" else "centred",
+            projectors=tuple(
+                OtherRings(
+                    id=p.id,
+                    world_from_ring=p.world_from_ring.tolist(),
+                    ring_radii=tuple(p.ring_radii.tolist()),
+                )
+                for p in turned
+            ),
+            measured_m2=claims.target_samples.samples.weight * int(measured.sum()),
+        )
+    asked = request.wishes.ring_axis or request.rig.rings.axis
+    return RingAxes(asked=asked, taken=partial.axes, other=other)
 
 
 def camera_records(

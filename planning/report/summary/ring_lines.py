@@ -1,7 +1,11 @@
 """What a plan says of its rings, and of estimated ranges, for a person."""
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
+from planning.model.acquisition import n_frames
 from planning.model.document.device_records import (
     ProjectorRecord,
     RingSharesRecord,
@@ -9,6 +13,7 @@ from planning.model.document.device_records import (
 )
 from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
+from planning.model.planned import PlannedProjector
 from planning.model.words import labelled, percent
 from planning.rings.ring_stage import tolerance_m
 
@@ -25,6 +30,7 @@ def ring_lines(plan: RigPlan) -> list[str]:
         if record.ring_shares is None:
             return []
         lines.append(_line(record, record.ring_shares))
+    lines += _axes_lines(plan)
     tolerance = tolerance_m(plan.requirements)
     lines += [note for record in records for note in _notes(record, tolerance)]
     return ["", *labelled("RINGS", lines)] if lines else []
@@ -43,11 +49,38 @@ def _line(record: ProjectorRecord, shares: RingSharesRecord) -> str:
             ("measured", shares.measured),
         )
     )
+    whole = sum(share == 1.0 for share in shares.on_object)
     missing = sum(share == 0.0 for share in shares.on_object)
     return (
-        f"{record.id:<4} {len(record.ring_radii)} rings{gap}, {missing} of them miss "
-        f"it; mean (least) share of a ring: {words}"
+        f"{record.id:<4} {len(record.ring_radii)} rings{gap}, {whole} wholly on it, "
+        f"{missing} miss it; mean (least) share of a ring: {words}"
     )
+
+
+def _axes_lines(plan: RigPlan) -> list[str]:
+    """Where ring axes stand, and what the others would have measured."""
+    axes, areas = plan.document.ring_axes, plan.coverage.target
+    if axes is None or not areas.lit_m2 > 0.0:
+        return []
+    share = percent(areas.measured_m2 / areas.lit_m2)
+    line = (
+        f"{axes.taken} axes: {_rings_words(plan, plan.projectors)}, {share} of the lit "
+        f"target measured"
+    )
+    if axes.other is not None:
+        pairs = zip(plan.projectors, axes.other.projectors, strict=True)
+        others = [replace(p, ring_radii=np.array(o.ring_radii)) for p, o in pairs]
+        line += (
+            f"; {axes.other.axis} ones would measure "
+            f"{percent(axes.other.measured_m2 / areas.lit_m2)} with "
+            f"{_rings_words(plan, others)}"
+        )
+    return [line]
+
+
+def _rings_words(plan: RigPlan, projectors: Sequence[PlannedProjector]) -> str:
+    n_rings = sum(len(projector.ring_radii) for projector in projectors)
+    return f"{n_rings} rings in {n_frames(projectors, len(plan.cameras))} frames"
 
 
 def _notes(record: ProjectorRecord, tolerance_m: float) -> list[str]:

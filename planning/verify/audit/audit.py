@@ -34,6 +34,7 @@ from planning.verify.audit.devices.mount_claims import audit_mounts
 from planning.verify.audit.devices.obstacle_claims import audit_obstacles
 from planning.verify.audit.devices.workspace_claims import audit_workspace
 from planning.verify.audit.devices.zone_claims import audit_zones
+from planning.verify.audit.rings.axis_claims import audit_ring_axes
 from planning.verify.audit.rings.ring_claims import audit_rings
 
 from .audit_case import AuditCase, examine
@@ -64,6 +65,7 @@ _CLAIMS = (
     audit_overlaps,
     audit_schedule,
     audit_rings,
+    audit_ring_axes,
     audit_limits,
     audit_scales,
     audit_cost,

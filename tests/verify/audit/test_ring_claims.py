@@ -20,6 +20,7 @@ from planning.verify.audit.audit import audit_plan
 from planning.verify.audit.audit_case import examine
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.predicates.audit_devices import AuditProjector
+from planning.verify.audit.rings.axis_claims import audit_ring_axes
 from planning.verify.audit.rings.ring_claims import audit_rings
 
 LIGHTS = ["diverging", "parallel"]
@@ -78,13 +79,13 @@ def drum(request, handmade):
     return examine(plan, seed=0, n_samples=1000, threads=1)
 
 
-def failures(drum, change=None):
+def failures(drum, change=None, audited=audit_rings):
     document = drum.plan.to_document()
     if change is not None:
         change(document)
     findings = AuditFindings()
     plan = RigPlan.from_document(document, drum.plan.surface)
-    audit_rings(dataclasses.replace(drum, plan=plan), findings)
+    audited(dataclasses.replace(drum, plan=plan), findings)
     return findings.failures
 
 
@@ -172,6 +173,51 @@ def test_false_claims_about_rings_are_named(drum, number):
     found = failures(drum, change)
     for _, sentence in FALSE[number]:
         assert any(sentence in failure for failure in found), (sentence, found)
+
+
+def test_rings_left_out_and_shown_are_held_against_rays(drum):
+    def told(left_out, margin, more=()):
+        def change(document):
+            document["rig"]["rings"]["margin_m"] = margin
+            document["projectors"][1]["rings"]["left_out"] = left_out
+            document["projectors"][1]["ring_radii"] += more
+
+        return " ".join(failures(drum, change))
+
+    shares = drum.plan.document.projectors[1].ring_shares
+    radii = drum.plan.projectors[1].ring_radii
+    middle = radii[len(radii) // 2]
+    assert shares.on_object[len(radii) // 2] > 0.0
+    words = "1 rings light the object and are left out"
+    assert words in told([middle * 1.001], 0.1 * middle)
+    beyond, words = [2.0, 2.5, 3.0], "light nothing of the object and are shown"
+    assert words in told([], 0.0, beyond)
+    assert words not in told([], 9.0, beyond)
+
+
+def test_false_claims_about_ring_axes_are_named(drum):
+    plan = drum.plan
+    ids = [projector.id for projector in plan.projectors]
+    same = [
+        {"id": p.id}
+        | {k: getattr(p, k).tolist() for k in ("world_from_ring",)}
+        | {"ring_radii": p.ring_radii.tolist()}
+        for p in plan.projectors
+    ]
+    area = drum.estimator.area(drum.actual.measured & drum.samples.in_target)
+    other = {"axis": "centred", "projectors": same, "measured_m2": area}
+
+    def told(**axes):
+        table = {"asked": "auto", "taken": "free", "other": other} | axes
+        return failures(drum, lambda d: d.update(ring_axes=table), audit_ring_axes)
+
+    assert told() == ()
+    assert "'free' is claimed where 'centred' was" in told(asked="centred")[0]
+    assert "is claimed to be centred" in told(taken="centred")[0]
+    (found,) = told(other=other | {"measured_m2": 0.5 * area})
+    assert found.startswith("ring_axes.other.measured_m2: claimed")
+    (found,) = told(other=other | {"projectors": same[::-1]})
+    assert str(ids[::-1]) in found
 
 
 def test_a_run_that_was_cut_needs_no_report_on_rings(drum):

@@ -8,6 +8,7 @@ import numpy as np
 from geometry.arrays import Array
 from geometry.devices import PinholeModel
 from planning.model.document.device_records import CameraRecord, ProjectorRecord
+from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Existing, Workspace
@@ -63,9 +64,27 @@ def audit_devices(case: AuditCase, findings: AuditFindings) -> None:
         audit_poses("world_from_ring", np.array([record.world_from_ring]), below)
         ring = projector.world_from_ring
         audit_ring_frames("world_from_ring", projector.light, ring, below)
-        last, stated = float(projector.radii[-1]), space.reference_ring_radius
-        below.number("ring_radii (last)", last, stated, 1e-9, "")
+        _audit_last_ring(record, document, space, below)
         below.same("light", record.light, document.rig.light, "rig.light")
+
+
+def _audit_last_ring(
+    record: ProjectorRecord,
+    document: PlanDocument,
+    space: Workspace,
+    findings: AuditFindings,
+) -> None:
+    """Check the outermost ring, shown or not: the reference, less if centred.
+
+    Rings that stay are those of an existing device.
+    """
+    rings, axes = record.rings, document.ring_axes
+    if rings is not None and rings.spacing == "kept":
+        return
+    hidden = () if rings is None else rings.left_out
+    last, stated = max(*record.ring_radii, *hidden), space.reference_ring_radius
+    if axes is None or axes.taken == "free" or last > stated:
+        findings.number("ring_radii (last)", last, stated, 1e-9, "")
 
 
 def _audit_model(

@@ -10,6 +10,7 @@ import numpy as np
 
 from geometry.arrays import Array, Mask
 from geometry.devices import ParallelModel, PinholeModel
+from geometry.mesh.extent import enclosing_ball
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
 
@@ -77,6 +78,16 @@ class DivergingRays:
         """Return how far ring frames (n, 4, 4) leave the optical centre, (n, k) [m]."""
         return frame[..., :3, 3] - self.pose[..., :3, 3]
 
+    def narrowest_ring(self, points: Array) -> float:
+        """Return the tangent of the narrowest cone, about any axis, that holds them."""
+        rays, _ = self.to_points(points)
+        axis, _ = enclosing_ball(rays)
+        return float(np.tan(np.arccos((rays @ axis).min() / np.linalg.norm(axis))))
+
+    def coordinate_of(self, length_m: float, standoff_m: float) -> float:
+        """Return what a length across the light at the standoff is of c."""
+        return length_m / standoff_m
+
 
 @dataclass(frozen=True, eq=False)
 class ParallelRays:
@@ -127,6 +138,15 @@ class ParallelRays:
         axis = self.pose[..., :3, 2]
         shift = np.sum((frame[..., :3, 3] - self.pose[..., :3, 3]) * axis, axis=-1)
         return np.concatenate([shift[..., None], frame[..., :3, 2] - axis], axis=-1)
+
+    def narrowest_ring(self, points: Array) -> float:
+        """Return the radius of the narrowest cylinder along the light, [m]."""
+        flat = in_frame(self.pose, points) * [1.0, 1.0, 0.0]
+        return enclosing_ball(flat)[1]
+
+    def coordinate_of(self, length_m: float, standoff_m: float) -> float:
+        """Return what a length across the light is of c."""
+        return length_m
 
 
 def light_from(

@@ -85,20 +85,23 @@ def _audit_spacing(
     )
     if not findings.holds(count >= 2, "n_even", f"{count!r} must be at least 2 rings"):
         return
-    even = float(projector.radii[-1]) * np.arange(1, count + 1) / count
+    every = np.sort(np.concatenate([projector.radii, rings.left_out]))
+    even = float(every[-1]) * np.arange(1, count + 1) / count
     findings.holds(
         spacing != "uniform"
         or (
-            len(even) == len(projector.radii)
-            and np.allclose(projector.radii, even, rtol=0.0, atol=ROUNDING * even[-1])
+            len(even) == len(every)
+            and np.allclose(every, even, rtol=0.0, atol=ROUNDING * even[-1])
         ),
         "n_even",
-        f"the {len(projector.radii)} ring_radii aren't {count} at equal steps, but "
-        f"'uniform' is claimed",
+        f"the {len(every)} ring_radii aren't {count} at equal steps, but 'uniform' is "
+        f"claimed",
     )
     rows = np.arange(1, ROWS * len(even) + 1) * (even[0] / ROWS)
     grid = cast_rings(case, projector, rows)
     _audit_gaps(rings, even, grid, findings)
+    if "left_out" in rings.model_fields_set:
+        _audit_idle(every, np.array(rings.left_out), grid, case, findings)
     limits = case.plan.requirements
     sigma = limits.triangulation.max_sigma_m
     tolerance = limits.check.max_p95_m if sigma is None else sigma
@@ -136,6 +139,44 @@ def _audit_gaps(
     for place, largest in enumerate((False, True)):
         name, claimed = f"gap_m.{place}", rings.gap_m[place]
         audit_extreme(name, claimed, gaps, alike, findings, largest=largest)
+
+
+def _audit_idle(
+    every: Array,
+    left_out: Array,
+    grid: RingGrid,
+    case: AuditCase,
+    findings: AuditFindings,
+) -> None:
+    """Check that rings left out would light nothing, and that those shown may.
+
+    The object is where rays meet it and where the panel holds its vertices. The band of
+    a ring reaches to its neighbours, and `rig.rings.margin_m` beyond at the standoff; a
+    row of the grid is left to rounding.
+    """
+    rig, projector = case.plan.document.rig, grid.projector
+    margin = projector.light.coordinate_of(
+        float(rig.rings.get("margin_m", 0.0)), rig.standoff_m or 1.0
+    )
+    vertices = case.plan.surface.mesh.vertices
+    met = projector.ring_coordinate(vertices[projector.light.leaves(vertices)])
+    rows = np.unique(grid.coordinates[grid.rays // AZIMUTHS])
+    places = np.sort(np.concatenate([rows, met]))
+    edges = np.concatenate([[0.0], every, [2.0 * every[-1] - every[-2]]])
+    hidden, row = np.isin(every, left_out), float(grid.coordinates[0])
+    room = np.where(hidden, margin - row, margin + row)
+    begin = np.searchsorted(places, edges[:-2] - room, side="left")
+    lights = begin < np.searchsorted(places, edges[2:] + room, side="right")
+    for wrong, key, words in (
+        (hidden & lights, "left_out", "light the object and are left out"),
+        (~hidden & ~lights, "ring_radii", "light nothing of the object and are shown"),
+    ):
+        findings.holds(
+            not wrong.any(),
+            key,
+            f"{np.count_nonzero(wrong)} rings {words}, with a margin of "
+            f"{margin:.4g}: {np.round(every[wrong][:3], 6).tolist()}",
+        )
 
 
 def _audit_ring_shares(

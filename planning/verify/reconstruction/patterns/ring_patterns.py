@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
+from planning.model.planned import code_bits
 from planning.verify.reconstruction.arrays import Array, Grey, Images, Indices, Mask
 from planning.verify.reconstruction.light_laws import LightLaw
 
@@ -66,7 +67,7 @@ class DrawnRings:
     @property
     def n_bits(self) -> int:
         """Bits of the annulus index."""
-        return max(1, (self.n_annuli - 1).bit_length())
+        return code_bits(len(self.radii))
 
     @property
     def outer_radius(self) -> float:

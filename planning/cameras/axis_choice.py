@@ -1,0 +1,140 @@
+"""Where ring axes stand: in the middle of the light, or where errors are smallest.
+
+Centred rings are fewest and lie on the object. The blind curve of a camera, where r.m =
+0, then crosses the object, so that it may take more cameras.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from planning.model.document.certificates import CamerasBy
+from planning.model.document.device_records import AxisTaken, RingAxis
+from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.rings.axis_moves import move_ring_axes
+from planning.rings.centred_axes import centred_axes
+from planning.rings.idle_rings import without_idle
+from planning.scene.camera_views import CandidateViews
+from planning.scene.measured import lit_samples
+from planning.scene.samples import Target
+from planning.scene.scene import Scene
+from solvers.covers.cover import solve_cover
+
+from .camera_cover import (
+    NothingMeasuredError,
+    candidate_cover,
+    measured_of,
+    n_fixed,
+)
+from .camera_stage import CameraSolution, place_cameras
+from .proved_cameras import CameraStage
+
+
+def place_for_axes(
+    scene: Scene,
+    projectors: tuple[PlannedProjector, ...],
+    candidates: CandidateViews,
+    by: CamerasBy,
+    *,
+    axis: RingAxis,
+    margin: float,
+) -> CameraSolution:
+    """Choose cameras for ring axes as they are wanted.
+
+    `auto` takes centred axes if they take no more cameras than free ones: either that
+    was proved over the candidates, or these are planned as well. The margin is how far
+    beside the lit surface centred rings reach, in the unit of radii.
+
+    Raises:
+        NothingMeasuredError: If no candidate measures any lit sample.
+    """
+    if axis == "free":
+        return place_cameras(scene, projectors, candidates, by)
+    middle = centred_axes(scene, projectors, margin)
+    try:
+        centred = place_cameras(scene, middle, candidates, by, "centred")
+    except NothingMeasuredError:
+        if axis == "centred":
+            raise
+        return place_cameras(scene, projectors, candidates, by)
+    if axis == "centred" or no_axes_need_fewer(scene, centred.stage):
+        return centred
+    free = place_cameras(scene, projectors, candidates, by)
+    return min(centred, free, key=_burden)
+
+
+def no_axes_need_fewer(scene: Scene, stage: CameraStage) -> bool:
+    """Return whether the requirement is met, and by no fewer candidates of any axes.
+
+    Whatever a camera measures it sees: no cover of what is seen with fewer cameras
+    bounds those of all ring axes, for as many samples measured.
+    """
+    cover = stage.cover
+    if stage.certificate.status == "infeasible":
+        return False
+    seen = np.zeros_like(cover.measured)
+    for camera, view in enumerate(cover.candidates.on(cover.samples.target)):
+        seen[view.samples, camera] = True
+    reached = np.any(cover.measured, axis=1)
+    bound = solve_cover(candidate_cover(scene, seen[reached]).problem, seed=scene.seed)
+    return bound.lower_bound >= len(stage.cameras)
+
+
+def standing_axes(
+    scene: Scene,
+    projectors: tuple[PlannedProjector, ...],
+    views: CandidateViews,
+    target: Target,
+    *,
+    axis: RingAxis,
+    margin: float,
+) -> tuple[tuple[PlannedProjector, ...], AxisTaken]:
+    """Return existing projectors with ring axes for the existing cameras, and which.
+
+    `auto` takes centred ones if with them enough of the target is measured.
+    """
+    if axis != "free":
+        centred = centred_axes(scene, projectors, margin)
+        _, measured = measured_of(scene, centred, views, target)
+        cover = candidate_cover(scene, measured)
+        if axis == "centred" or cover.confirms(np.arange(cover.n_existing)):
+            return centred, "centred"
+    cameras = views.cameras[: n_fixed(scene)]
+    lit = lit_samples(scene, projectors, target)
+    return move_ring_axes(scene, projectors, cameras, lit), "free"
+
+
+def other_axes(
+    scene: Scene,
+    solution: CameraSolution,
+    cameras: Sequence[PlannedCamera],
+    template: PlannedProjector,
+    margin: float,
+) -> tuple[PlannedProjector, ...]:
+    """Return the projectors with the ring axes that weren't taken, to compare.
+
+    Free axes start from the template's and move for the cameras as they stand.
+    """
+    projectors, samples = solution.projectors, solution.stage.cover.samples
+    scene = scene.among((*projectors, *cameras))
+    if solution.axes == "free":
+        return centred_axes(scene, projectors, margin)
+    aside = tuple(
+        p if p.keeps_rings else _with_rings_of(p, template) for p in projectors
+    )
+    free = move_ring_axes(scene, aside, cameras, samples)
+    return tuple(without_idle(scene, projector, margin) for projector in free)
+
+
+def _with_rings_of(
+    projector: PlannedProjector, template: PlannedProjector
+) -> PlannedProjector:
+    frame = projector.world_from_device @ template.world_from_ring
+    return replace(projector, world_from_ring=frame, ring_radii=template.ring_radii)
+
+
+def _burden(solution: CameraSolution) -> tuple[bool, int]:
+    """Smaller where the requirement is met, then where cameras are fewer."""
+    proof = solution.stage.certificate
+    return proof.status == "infeasible", len(solution.stage.cameras)

@@ -1,0 +1,85 @@
+"""Claims about ring axes: that they are centred, and what others would measure."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from geometry.arrays import Mask
+from planning.verify.audit.audit_case import AuditCase
+from planning.verify.audit.audit_findings import AuditFindings
+from planning.verify.audit.devices.workspace_claims import audit_ring_frames
+from planning.verify.audit.predicates.audit_devices import AuditProjector
+from planning.verify.audit.predicates.predicates import LIT, MEASURED, light_steps
+from planning.verify.audit.predicates.recompute import pairs_with
+
+# Other samples reach a little farther: so much wider than the narrowest may a ring be.
+_WIDER = 0.05
+
+
+def audit_ring_axes(case: AuditCase, findings: AuditFindings) -> None:
+    """Check `ring_axes`; a plan without claims nothing."""
+    axes, findings = case.plan.document.ring_axes, findings.at("ring_axes")
+    if axes is None:
+        return
+    findings.holds(
+        axes.asked in (axes.taken, "auto"),
+        "taken",
+        f"{axes.taken!r} is claimed where {axes.asked!r} was asked",
+    )
+    if axes.taken == "centred":
+        for p, record in enumerate(case.plan.document.projectors):
+            kept = record.rings is not None and record.rings.spacing == "kept"
+            if not kept:
+                _audit_centred(case, p, findings.at(record.id))
+    if axes.other is None:
+        return
+    others, below = axes.other.projectors, findings.at("other")
+    ids = [record.id for record in case.plan.document.projectors]
+    named = [other.id for other in others]
+    if not below.holds(named == ids, "projectors", f"are {named}, the plan's {ids}"):
+        return
+    turned = [
+        replace(
+            projector,
+            world_from_ring=np.array(other.world_from_ring),
+            radii=np.array(other.ring_radii),
+        )
+        for projector, other in zip(case.projectors, others, strict=True)
+    ]
+    for projector in turned:
+        frame = projector.world_from_ring
+        audit_ring_frames("world_from_ring", projector.light, frame, below)
+    claimed, measured = axes.other.measured_m2, _measured(case, turned)
+    case.estimator.audit("measured_m2", claimed, measured, below, part="target")
+
+
+def _audit_centred(case: AuditCase, p: int, findings: AuditFindings) -> None:
+    """Check that hardly a narrower ring about another axis holds what is lit."""
+    projector, points = case.projectors[p], case.samples.points[case.actual.lit_by[p]]
+    if len(points) == 0:
+        return
+    reach = float(projector.ring_coordinate(points).max())
+    least = projector.light.narrowest_ring(points)
+    findings.holds(
+        reach <= (1.0 + _WIDER) * least,
+        "world_from_ring",
+        f"is claimed to be centred, but what is lit reaches out to a ring of "
+        f"{reach:.5g}, and about another axis to one of {least:.5g}",
+    )
+
+
+def _measured(case: AuditCase, projectors: Sequence[AuditProjector]) -> Mask:
+    """Whether any pair measures each sample of the target, shape (n,)."""
+    limits, chosen = case.plan.requirements, np.flatnonzero(case.samples.in_target)
+    samples = case.samples.take(chosen)
+    lit_by = np.stack(
+        [light_steps(p, samples, limits.projector, case.shadow) for p in projectors]
+    )
+    measured = np.zeros(len(case.samples), dtype=bool)
+    for camera in case.cameras:
+        steps = pairs_with(
+            camera, projectors, samples, lit_by == LIT, limits, case.shadow
+        )
+        measured[chosen] |= np.any(steps == MEASURED, axis=0)
+    return measured
