@@ -11,6 +11,7 @@ from geometry.parallel import n_threads
 from planning.model.plan import RigPlan
 from planning.model.words import labelled, percent
 from planning.report.summary.device_lines import device_lines, gap_lines, mount_lines
+from planning.report.summary.region_lines import region_table
 from planning.report.summary.zone_lines import zone_lines
 from planning.verify.audit.devices.camera_figures import (
     CameraFigures,
@@ -24,6 +25,12 @@ from .console import print_json
 def show_command(options: Mapping[str, Any]) -> int:
     """Print places in the axes of the mesh, devices, and what each camera sees."""
     plan = RigPlan.load(options["plan_file"])
+    if options["regions"]:
+        if options["as_json"]:
+            print_json({"regions": plan.to_document()["regions"]})
+        else:
+            click.echo("\n".join(region_table(plan)))
+        return 0
     cameras = camera_figures(plan, threads=options["threads"] or n_threads())
     if options["as_json"]:
         print_json({"cameras": [asdict(camera) for camera in cameras]})

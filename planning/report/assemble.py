@@ -26,6 +26,7 @@ from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
 from planning.model.surface import Surface
+from planning.report.advice.floor_relaxations import with_floor_relaxations
 from planning.report.advice.what_helps import with_fewer_needed, with_relaxations
 from planning.report.entries.cost_entry import cost_record
 from planning.report.entries.overlaps import overlap_records
@@ -53,10 +54,13 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
         marginal = marginal_records(partial, devices, claims)
     among = scene.among((*devices.projectors, *devices.cameras))
     coverage, certificates = claims.coverage, _certificates(partial)
+    regions = entries.region_records(scene.mesh, partial.ready.regions, claims)
     if not partial.truncated:
         coverage = with_relaxations(partial, devices, claims, clock)
+        regions = with_floor_relaxations(
+            regions, claims.region_samples, partial.request.rig, devices
+        )
         certificates = with_fewer_needed(certificates, partial, clock)
-    regions = entries.region_records(scene.mesh, partial.ready.regions, claims)
     overlaps, schedule = overlap_records(among, devices.projectors)
     surface = _surface(scene, devices)
     requirements = _final_requirements(among, claims, devices)

@@ -1,5 +1,6 @@
 """What a plan may claim of each dominant region, on samples enough for its share."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,6 +42,7 @@ class RegionSamples:
         lit, measured, by_projectors, by_cameras: As in `Judged`, shape (n,).
         causes: By which limit each isn't measured, "" where it is, shape (n,).
         primary: Index of the projector that each is assigned to, -1 for none, (n,).
+        measured_by: Which camera measures each, shape (n, n_cameras).
     """
 
     scene: Scene
@@ -52,6 +54,7 @@ class RegionSamples:
     by_cameras: _Mask
     causes: NDArray[np.str_]
     primary: NDArray[np.int64]
+    measured_by: _Mask
 
     @classmethod
     def of(cls, scene: Scene, devices: Devices, judged: Judged) -> "RegionSamples":
@@ -78,6 +81,7 @@ class RegionSamples:
             of_all("by_cameras"),
             np.concatenate([part.causes(scene, devices) for part in parts]),
             assigned_projectors(first == LIT, margins),
+            of_all("measured_by"),
         )
 
     def worst(self, lit: _Mask) -> tuple[int, float] | None:
@@ -100,7 +104,7 @@ def claim_regions(devices: Devices, samples: RegionSamples) -> tuple[RegionClaim
     large, floor = scene.large_regions, scene.requirements.region_coverage
     claims: list[RegionClaim] = []
     for index in range(int(scene.region.max()) + 1):
-        areas = _areas(samples, index)
+        areas = _areas(samples, index, [camera.id for camera in devices.cameras])
         if floor and index in large:
             met = meets_floor(areas, floor)
             areas = areas.changed(floor="met" if met else "missed")
@@ -113,7 +117,9 @@ def claim_regions(devices: Devices, samples: RegionSamples) -> tuple[RegionClaim
     return tuple(claims)
 
 
-def _areas(samples: RegionSamples, index: int) -> RegionCoverage:
+def _areas(
+    samples: RegionSamples, index: int, cameras: Sequence[str]
+) -> RegionCoverage:
     mesh, inside = samples.scene.mesh, samples.region == index
     n = int(inside.sum())
     area = float(mesh.face_areas[samples.scene.region == index].sum())
@@ -133,6 +139,13 @@ def _areas(samples: RegionSamples, index: int) -> RegionCoverage:
         reachable_by_cameras_m2=by_cameras,
         measured_m2=measured,
         uncovered_by_cause=by_cause(samples.causes[inside], area / max(n, 1)),
+        measured_by={
+            name: area * (count / n)
+            for name, count in zip(
+                cameras, samples.measured_by[inside].sum(axis=0).tolist(), strict=True
+            )
+            if count
+        },
         floor=None,
     )
 

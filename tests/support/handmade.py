@@ -663,6 +663,10 @@ def _region_coverage(mine: Any, share: float) -> dict[str, Any]:
         for c in LIGHT + SIGHT + PAIR
     }
     areas["uncovered_by_cause"] = {cause: a for cause, a in split.items() if a > 0}
+    areas["measured_by"] = {
+        name: area(lambda row, j=j: row["seen"][j])
+        for j, name in enumerate(("C1", "C2"))
+    }
     met = areas["lit_m2"] >= share * areas["reachable_by_projectors_m2"]
     met &= areas["measured_m2"] >= share * areas["reachable_by_cameras_m2"]
     return areas | {"floor": "met" if met else "missed"}

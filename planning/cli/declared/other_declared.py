@@ -47,6 +47,12 @@ def verify(**options: Any) -> None:  # noqa: ANN401
 
 @click.command()
 @click.argument("plan_file", type=PlanFile(), metavar="DIR[/plan.json]")
+@click.option(
+    "--regions",
+    is_flag=True,
+    help="Instead: every dominant region, where it lies and what of it is reached, lit "
+    "and measured.",
+)
 @threads_option
 @output_options
 def show(**options: Any) -> None:  # noqa: ANN401

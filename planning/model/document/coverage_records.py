@@ -78,6 +78,7 @@ class RegionCoverage(Part):
         samples: Fresh samples behind the figures, more than those of the target where
             few of these fall into a large region.
         uncovered_by_cause: Area that isn't measured.
+        measured_by: Area that each camera measures, of those that measure any of it.
         floor: Whether enough of it is lit and measured; None: it has no floor.
         relaxations: What would let a missed floor be met.
     """
@@ -88,6 +89,7 @@ class RegionCoverage(Part):
     reachable_by_cameras_m2: float
     measured_m2: float
     uncovered_by_cause: dict[str, float]
+    measured_by: dict[str, float]
     floor: Literal["met", "missed"] | None
     relaxations: tuple[str, ...] = ()
 

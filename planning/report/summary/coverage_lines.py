@@ -6,8 +6,9 @@ from planning.model.plan import RigPlan
 from planning.model.words import area_words, labelled, percent
 from planning.report.advice.least_changes import ANY_SETTING
 
+from .cause_words import causes_line
 from .proof_lines import user_selection
-from .shortfall import causes_line
+from .region_lines import region_lines
 
 # Surfaces below this are told in mm² [m²].
 _SMALL_M2 = 1e-3
@@ -58,6 +59,7 @@ def coverage_lines(plan: RigPlan) -> list[str]:
         "",
         *labelled("", table),
         *labelled("COVERAGE", lines),
+        *region_lines(plan),
         *schedule_lines(document),
     ]
 
@@ -178,4 +180,12 @@ def marginal_lines(plan: RigPlan) -> list[str]:
             for n, area in areas.items()
         ]
         lines.append(f"{deed} of the target   {'   '.join(cells)}")
+    worst = [
+        f"{row.n_projectors}{'*' * (row.n_projectors == len(plan.projectors))}: "
+        f"region {row.worst_region} {percent(row.worst_region_lit)}"
+        for row in lit
+        if row.worst_region is not None and row.worst_region_lit is not None
+    ]
+    if worst:
+        lines.insert(2, f"projectors lit of the worst region   {'   '.join(worst)}")
     return ["", *labelled("MARGINAL", lines)]

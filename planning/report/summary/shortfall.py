@@ -1,6 +1,5 @@
 """Which requirements a plan misses, why, and what would help."""
 
-import math
 from collections.abc import Iterator
 
 from planning.model.document.certificates import Certificate
@@ -14,18 +13,8 @@ from planning.scene.limits.limit import causes
 from planning.scene.limits.pair_limits import MEASURED_LIMITS
 from planning.scene.limits.projector_limits import PROJECTOR_LIMITS
 
-# Causes that take less than this share of what is left aren't told.
-_LEAST_SHARE = 0.01
-_CAUSE_WORDS = {limit.name: limit.words for limit in PROJECTOR_LIMITS + MEASURED_LIMITS}
-
-
-def causes_line(areas: dict[str, float], whole: float, *, most: int = 3) -> str:
-    """Return the largest causes with their share of an area, as one line."""
-    ranked = sorted(areas.items(), key=lambda pair: -pair[1])[:most]
-    return "; ".join(
-        f"{percent(area / whole)} {_CAUSE_WORDS.get(cause, cause)}"
-        for cause, area in ranked
-    )
+from .cause_words import areas_line, causes_line, rounded_down
+from .region_lines import floor_shortfalls
 
 
 def shortfalls(plan: RigPlan) -> tuple[str, ...]:
@@ -34,6 +23,7 @@ def shortfalls(plan: RigPlan) -> tuple[str, ...]:
     return (
         *_reachable(plan.document, required),
         *_covered(plan.document, required),
+        *floor_shortfalls(plan),
         *(() if check is None or check.passed else check.failures),
     )
 
@@ -58,7 +48,7 @@ def _reachable(document: PlanDocument, requirements: Requirements) -> Iterator[s
             "measured",
             areas.reachable_by_cameras_m2,
             areas.lit_m2,
-            f": {_areas_line(coverage.unmeasurable_by_cause)}",
+            f": {areas_line(coverage.unmeasurable_by_cause)}",
             coverage.camera_relaxations,
         ),
     ):
@@ -82,15 +72,8 @@ def _steps(relaxations: tuple[Relaxation, ...], share: float) -> str:
         f"{step.change} would reach {percent(step.reachable_share)}"
         for step in relaxations
     ]
-    return "; ".join((*steps, f"--min-reachable {_down(share)} accepts what there is"))
-
-
-def _areas_line(areas: dict[str, float]) -> str:
-    """The causes with their areas, the largest first, but for what is next to none."""
-    ranked = sorted(areas.items(), key=lambda pair: -pair[1])
-    phrases = [pair for pair in ranked if pair[1] >= _LEAST_SHARE * sum(areas.values())]
     return "; ".join(
-        f"{area_words(area)} {_CAUSE_WORDS.get(c, c)}" for c, area in phrases
+        (*steps, f"--min-reachable {rounded_down(share)} accepts what there is")
     )
 
 
@@ -149,7 +132,7 @@ def _why(kind: str, coverage: Coverage) -> str:
     if not areas:
         return ""
     of = "target" if kind == "projectors" else "lit target"
-    return f"Of the {of}: {_areas_line(areas)}. "
+    return f"Of the {of}: {areas_line(areas)}. "
 
 
 def _bodies(coverage: Coverage, proof: Certificate) -> str:
@@ -181,7 +164,7 @@ def _remedies(
     needed = proof.needed
     allowed = getattr(requirements, f"max_{kind}")
     option = "dominant-coverage" if kind == "projectors" else "coverage"
-    accept = f"--{option} {_down(share)} accepts this plan"
+    accept = f"--{option} {rounded_down(share)} accepts this plan"
     if evaluation is not None:
         # A share of 0 is none that an option takes.
         more = f"`plan --fixed {evaluation.path}` keeps these and seeks more {kind}"
@@ -198,9 +181,3 @@ def _remedies(
     option_of_count = f"--max-{kind} {needed.count} ({bound})"
     field = () if needed.wider_field is None else (needed.wider_field,)
     return ", ".join((option_of_count, *needed.relaxations, *field, f"or {accept}"))
-
-
-def _down(share: float) -> str:
-    """Rounded down to hundredths, or to one digit: no option takes a share of 0."""
-    places = 2 if not 0.0 < share < 0.01 else -math.floor(math.log10(share))
-    return f"{math.floor(10.0**places * share) / 10.0**places:.{places}f}"

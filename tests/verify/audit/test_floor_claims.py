@@ -89,6 +89,18 @@ LIES = {
         _cause("gremlins", 0.0),
         "1.coverage.uncovered_by_cause: causes that there are not: gremlins",
     ),
+    "camera": (
+        _region(0, measured_by=lambda x: {**x, "C1": 0.3 * x["C1"]}),
+        "regions.0.coverage.measured_by.C1: claimed",
+    ),
+    "camera left out": (
+        _region(0, measured_by=lambda x: {"C1": x["C1"]}),
+        "regions.0.coverage.measured_by.C2: claimed",
+    ),
+    "unknown camera": (
+        _region(0, measured_by=lambda x: {**x, "C9": 0.0}),
+        "regions.0.coverage.measured_by: cameras that aren't: C9",
+    ),
     "samples": (_region(1, samples=0), "1.coverage.samples: 0 of a large region"),
     "missed": (
         _region(1, floor="missed"),

@@ -36,10 +36,12 @@ class _RegionFigures:
 
     Attributes:
         covered: Which are in each of its areas, the smallest first, shape (n,) each.
+        measured_by: Whether each camera measures each, shape (n_c, n).
         cause: Index in `_CAUSES`, -1 where measured, shape (n,).
     """
 
     covered: dict[str, Mask]
+    measured_by: Mask
     cause: Ints
 
 
@@ -142,6 +144,13 @@ def _audit_coverage(
         f"{key}.{cause}": (causes.get(cause, 0.0), mask)
         for cause, mask in _by_cause(figures.cause)
     }
+    names, by = [camera.id for camera in case.plan.cameras], areas.measured_by
+    stranger = ", ".join(sorted(set(by) - set(names)))
+    findings.holds(not stranger, "measured_by", f"cameras that aren't: {stranger}")
+    masks |= {
+        f"measured_by.{name}": (by.get(name, 0.0), mask)
+        for name, mask in zip(names, figures.measured_by, strict=True)
+    }
     for name, (area, mask) in masks.items():
         count = np.array(mask.sum())
         slack = POINT + 3.0 * float(share_error(count, n, n_claimed))
@@ -171,6 +180,7 @@ def _figures(case: AuditCase, number: int, at_least: int) -> _RegionFigures:
     }
     return _RegionFigures(
         {name: np.concatenate(masks) for name, masks in covered.items()},
+        np.concatenate([a.measured_by[:, mask] for a, _, mask in parts], axis=1),
         np.concatenate([a.cause[mask] for a, _, mask in parts]),
     )
 

@@ -1,0 +1,75 @@
+"""Which single limit, relaxed by how little, would let a plan's devices meet a floor.
+
+Devices stay where the plan has them. Of the samples of the region that they leave dark
+or unmeasured, each asks a value of a limit; sorted, these say how far it must give way.
+"""
+
+from functools import reduce
+
+import numpy as np
+
+from planning.model.document.coverage_records import RegionRecord
+from planning.report.judged import Devices
+from planning.report.region_claims import RegionSamples
+from planning.rig.rig import Rig
+from planning.scene.measured import lit_samples
+
+from .camera_relaxations import least_demands
+from .demands import light_demands
+from .least_changes import (
+    least_changes,
+    relaxations_of_cameras,
+    relaxations_of_projectors,
+)
+
+
+def with_floor_relaxations(
+    regions: tuple[RegionRecord, ...],
+    samples: RegionSamples,
+    rig: Rig,
+    devices: Devices,
+) -> tuple[RegionRecord, ...]:
+    """Return regions with what would let those that miss their floor meet it.
+
+    Where too little is lit, limits of the projectors; else of the cameras and pairs.
+    Changes that alone aren't enough aren't told.
+    """
+    return tuple(
+        region.changed(
+            coverage=areas.changed(
+                relaxations=_enough(samples, region.id, rig, devices)
+            )
+        )
+        if (areas := region.coverage) is not None and areas.floor == "missed"
+        else region
+        for region in regions
+    )
+
+
+def _enough(
+    samples: RegionSamples, index: int, rig: Rig, devices: Devices
+) -> tuple[str, ...]:
+    scene, inside = samples.scene, samples.region == index
+    required = scene.requirements
+    scene = scene.among((*devices.projectors, *devices.cameras))
+
+    def wanted(covered: np.ndarray, reached: np.ndarray) -> int:
+        least = required.region_coverage * int(reached[inside].sum())
+        return int(np.ceil(least - 1e-9)) - int(covered[inside].sum())
+
+    if (lack := wanted(samples.lit, samples.by_projectors)) > 0:
+        dark = samples.target.take(inside & ~samples.lit)
+        device = devices.projectors[0].device
+        relaxations = relaxations_of_projectors(required, device)
+        asked = reduce(
+            np.minimum,
+            (light_demands(scene, p, dark, relaxations) for p in devices.projectors),
+        )
+    else:
+        lack = wanted(samples.measured, samples.by_cameras)
+        lit = samples.target.take(inside & samples.lit & ~samples.measured)
+        relaxations = relaxations_of_cameras(rig, required)
+        light = lit_samples(scene, devices.projectors, lit)
+        asked = least_demands(scene, devices.cameras, light, relaxations).demanded
+    gained = least_changes(relaxations, asked, lack)
+    return tuple(change for change, gain in gained.items() if gain >= lack)

@@ -1,0 +1,35 @@
+"""Causes with their areas, and shares that an option takes, for a person."""
+
+import math
+
+from planning.model.words import area_words, percent
+from planning.scene.limits.pair_limits import MEASURED_LIMITS
+from planning.scene.limits.projector_limits import PROJECTOR_LIMITS
+
+# Causes that take less than this share of what is left aren't told.
+_LEAST_SHARE = 0.01
+_CAUSE_WORDS = {limit.name: limit.words for limit in PROJECTOR_LIMITS + MEASURED_LIMITS}
+
+
+def causes_line(areas: dict[str, float], whole: float, *, most: int = 3) -> str:
+    """Return the largest causes with their share of an area, as one line."""
+    ranked = sorted(areas.items(), key=lambda pair: -pair[1])[:most]
+    return "; ".join(
+        f"{percent(area / whole)} {_CAUSE_WORDS.get(cause, cause)}"
+        for cause, area in ranked
+    )
+
+
+def areas_line(areas: dict[str, float]) -> str:
+    """Return causes with their areas, the largest first, but for next to none."""
+    ranked = sorted(areas.items(), key=lambda pair: -pair[1])
+    phrases = [pair for pair in ranked if pair[1] >= _LEAST_SHARE * sum(areas.values())]
+    return "; ".join(
+        f"{area_words(area)} {_CAUSE_WORDS.get(c, c)}" for c, area in phrases
+    )
+
+
+def rounded_down(share: float) -> str:
+    """Return a share to hundredths, or to one digit: few options take a share of 0."""
+    places = 2 if not 0.0 < share < 0.01 else -math.floor(math.log10(share))
+    return f"{math.floor(10.0**places * share) / 10.0**places:.{places}f}"

@@ -1,0 +1,180 @@
+"""Dominant regions for a person: where they lie, what of them is lit and measured."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from planning.model.document.coverage_records import RegionCoverage, RegionRecord
+from planning.model.plan import RigPlan
+from planning.model.words import area_words, count_words, labelled, percent
+from planning.scene.limits.limit import causes
+from planning.scene.limits.projector_limits import PROJECTOR_LIMITS
+
+from .cause_words import areas_line, rounded_down
+
+_AXES = "xyz"
+# Directions are named by axes that have at least this part of their length.
+_TOLD = 0.4
+# Nearer to the middle than this part of the object's width is no side.
+_MIDDLE = 0.1
+
+
+def region_words(plan: RigPlan, region: RegionRecord) -> str:
+    """Return which region it is: number, size, where it lies and where it faces."""
+    return f"region {region.id} ({area_words(region.area_m2)}{_place(plan, region)})"
+
+
+def region_lines(plan: RigPlan) -> list[str]:
+    """Return how many regions meet the floor, and the worst; none of older plans."""
+    shares = {region.id: min(_shares(areas)) for region, areas in _large(plan)}
+    if not shares:
+        return []
+    asked, n = plan.requirements.region_coverage, len(shares)
+    met = n - sum(areas.floor == "missed" for _, areas in _large(plan))
+    floor = (
+        f"{met} of {n} meet the floor, {percent(asked)} of what can be lit and of what "
+        f"can be measured"
+        if asked
+        else f"{count_words(n, 'region')} of at least "
+        f"{percent(plan.requirements.region_share)} of the target, no floor"
+    )
+    least = min(shares, key=lambda number: shares[number])
+    region, areas = next(pair for pair in _large(plan) if pair[0].id == least)
+    worst = f"worst: {region_words(plan, region)}, {_deed(areas)}"
+    return labelled("REGIONS", [floor, worst])
+
+
+def region_table(plan: RigPlan) -> list[str]:
+    """Return every region in a line: size, cone, shares, by which devices, where."""
+    large = {region.id for region, _ in _large(plan)}
+    lines = [
+        "lit is the share of what projectors can reach (of the area), measured that of "
+        "what cameras can reach (of what is lit)",
+        "region      cm²  cone [deg]  reachable     lit  measurable  measured  "
+        f"{'floor':<7} {'by':<24}where, and where it faces",
+    ]
+    for region in plan.document.regions:
+        head = f"{region.id:>6} {1e4 * region.area_m2:8.2f} "
+        head += f"{np.degrees(region.cone_angle):11.0f}  "
+        areas = region.coverage
+        if areas is None or not areas.samples:
+            lines.append(f"{head}not sampled{_place(plan, region).replace(',', '', 1)}")
+            continue
+        lit, measured = _shares(areas)
+        reach = percent(areas.reachable_by_projectors_m2 / region.area_m2)
+        able = percent(areas.reachable_by_cameras_m2 / areas.lit_m2) if lit else "-"
+        done = percent(measured) if areas.reachable_by_cameras_m2 else "-"
+        floor = areas.floor or ("none" if region.id in large else "small")
+        by = " ".join((*region.lit_by, *areas.measured_by)) or "none"
+        lines.append(
+            f"{head}{reach:>9} {percent(lit):>7}  {able:>10}  {done:>8}  "
+            f"{floor:<7} {by:<23}{_place(plan, region).replace(',', '', 1)}"
+        )
+    return lines
+
+
+def floor_shortfalls(plan: RigPlan) -> Iterator[str]:
+    """Yield a sentence for each region that misses its floor: which, why, remedies."""
+    missed = [(r, areas) for r, areas in _large(plan) if areas.floor == "missed"]
+    accepted = min((min(_shares(areas)) for _, areas in missed), default=0.0)
+    for region, areas in missed:
+        lit, _ = _shares(areas)
+        asked = plan.requirements.region_coverage
+        unlit = lit < asked
+        kind = "projectors" if unlit else "cameras"
+        of_light = causes(PROJECTOR_LIMITS)
+        why = {
+            cause: area
+            for cause, area in areas.uncovered_by_cause.items()
+            if (cause in of_light) == unlit or cause == "blocked_by_obstacle"
+        }
+        yield (
+            f"{region_words(plan, region)} is {_deed(areas)}, {percent(asked)} is "
+            f"required of each region (--region-coverage). Of it: {areas_line(why)}. "
+            f"What would help: "
+            f"{', or '.join((*_remedies(plan, areas, kind), _accepting(accepted)))}"
+        )
+
+
+def _remedies(plan: RigPlan, areas: RegionCoverage, kind: str) -> Iterator[str]:
+    evaluation = plan.document.evaluation
+    if evaluation is not None:
+        yield f"`plan --fixed {evaluation.path}` keeps these and seeks more {kind}"
+    else:
+        allowed = getattr(plan.requirements, f"max_{kind}")
+        proof = getattr(plan.document.certificates, kind)
+        if allowed is not None and proof.needed.count > allowed:
+            yield (
+                f"--max-{kind} {proof.needed.count} "
+                f"(at least {proof.needed.lower_bound} proved over the candidates)"
+            )
+    yield from (f"with these {kind} {change}" for change in areas.relaxations)
+
+
+def _accepting(share: float) -> str:
+    accepted = rounded_down(share) if share > 0.0 else "0"
+    return f"--region-coverage {accepted} accepts this plan"
+
+
+def _large(plan: RigPlan) -> Iterator[tuple[RegionRecord, RegionCoverage]]:
+    """Yield the regions that a floor is for, with their areas."""
+    least = plan.requirements.region_share * plan.coverage.target.area_m2
+    for region in plan.document.regions:
+        if region.coverage is not None and region.area_m2 >= least * (1.0 - 1e-9):
+            yield region, region.coverage
+
+
+def _shares(areas: RegionCoverage) -> tuple[float, float]:
+    """Lit and measured, of what can be; of nothing all is."""
+    lit, measured = (
+        part / whole if whole > 0.0 else 1.0
+        for part, whole in (
+            (areas.lit_m2, areas.reachable_by_projectors_m2),
+            (areas.measured_m2, areas.reachable_by_cameras_m2),
+        )
+    )
+    return lit, measured
+
+
+def _deed(areas: RegionCoverage) -> str:
+    lit, measured = _shares(areas)
+    if not areas.reachable_by_projectors_m2:
+        return "out of reach of every projector"
+    if not areas.reachable_by_cameras_m2:
+        return f"lit {percent(lit)} of what can be and measured nowhere"
+    return f"lit {percent(lit)} and measured {percent(measured)} of what can be"
+
+
+def _place(plan: RigPlan, region: RegionRecord) -> str:
+    """Height and side on the object, by `up` and the axes of the mesh, after ", "."""
+    if region.centre_m is None:
+        return ""
+    up = np.array(plan.requirements.workspace.up)
+    mesh, place = plan.surface.mesh, np.array(region.centre_m)
+    heights, height = mesh.vertices @ up, float(place @ up)
+    low, high = float(heights.min()), float(heights.max())
+    third = ("bottom", "middle", "top")[min(int(3 * (height - low) / (high - low)), 2)]
+    across = (place - mesh.centre) - ((place - mesh.centre) @ up) * up
+    width = np.ptp(mesh.vertices - heights[:, None] * up, axis=0).max()
+    beside = np.linalg.norm(across) > _MIDDLE * width
+    side = f"towards {_direction(across, up)}" if beside else "about the middle"
+    return (
+        f", {third} third, {side}, {1e3 * (height - low):.0f} mm above the lowest "
+        f"point, facing {_direction(region.mean_normal, up)}"
+    )
+
+
+def _direction(vector: ArrayLike, up: ArrayLike) -> str:
+    """The axes that a direction goes along, the most first; up and down by name."""
+    along = np.asarray(vector) / np.linalg.norm(vector)
+    named = [
+        k for k in np.argsort(-np.abs(along), kind="stable") if abs(along[k]) >= _TOLD
+    ]
+    rise = np.asarray(up)
+    return " ".join(
+        ("up" if along[k] * rise[k] > 0.0 else "down")
+        if rise[k]
+        else f"{'+' if along[k] > 0.0 else '-'}{_AXES[k]}"
+        for k in named
+    )
