@@ -108,6 +108,26 @@ class Panel:
         self._draw.text(spot, text, colour, font=font(size))
         self.taken.append(box)
 
+    def mark(self, points: NDArray[np.float64], text: str, *, size: float) -> None:
+        """Write a text onto the first point of the world (n, 3) where there is room."""
+        halo = 2 * SUPERSAMPLING
+        left, top, right, bottom = font(size).getbbox(text, anchor="mm")
+        spots = self.view.project(points)
+        around = [left - halo, top - halo, right + halo, bottom + halo]
+        boxes = np.tile(spots, 2) + np.array(around)
+        first = int(np.argmin(_overlaps(boxes, self.taken)))
+        self._draw.text(
+            tuple(spots[first]),
+            text,
+            INK,
+            font=font(size),
+            anchor="mm",
+            stroke_width=halo,
+            stroke_fill=BACKGROUND,
+        )
+        a, b, c, d = boxes[first].tolist()
+        self.taken.append((a, b, c, d))
+
     def _clearest(self, spot: NDArray[np.float64], extent: NDArray[np.float64]) -> _Box:
         """The box about a spot that covers least: nearest and most outward first."""
         x, y = spot - 0.5 * np.array(self.view.size)

@@ -5,6 +5,7 @@ with distances, and the object close up, coloured by what the plan measures.
 """
 
 from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +31,7 @@ from .figures import (
 from .obstacle_figures import OBSTACLE, draw_obstacles, obstacle_figures
 from .panel import INK, PALE, Panel, font
 from .picture_view import BACKGROUND, SUPERSAMPLING, Colour, fitted
+from .region_numbers import direction_of_unseen, region_spots
 from .shader import Shader
 
 _DEVICES: dict[str, Colour] = {"projector": (200, 80, 0), "camera": (0, 90, 160)}
@@ -169,18 +171,24 @@ def _close_up(
     if obstacle_figures(plan, zone_reach(plan)):
         rows.append(("obstacle", OBSTACLE))
     foot = (-(-len(rows) // 2) * 21 + 8) * SUPERSAMPLING
-    half = (size[0] // 2, size[1] - foot)
     mesh, up = plan.surface.mesh, np.array(plan.requirements.workspace.up)
     directions = close_directions(_positions(figures), mesh.centre, up)
+    spots = [region_spots(plan, shader.caster, back) for back in directions]
+    if (back := direction_of_unseen(plan, chain(*spots))) is not None:
+        directions.append(back)
+        spots.append(region_spots(plan, shader.caster, back))
+    part = (size[0] // len(directions), size[1] - foot)
     for k, direction in enumerate(directions):
         corners = mesh.corners.reshape(-1, 3)
-        view = fitted(corners, direction, up, half, margin_px=0.11 * min(half))
+        view = fitted(corners, direction, up, part, margin_px=0.11 * min(part))
         panel = Panel(shader.shade(view), view)
         panel.axes(size=12.0)
+        panel.scale_bar(size=13.0)
         if k == 0:
-            panel.scale_bar(size=13.0)
-            panel.heading("The object, close up")
-        picture.paste(panel.image, (k * half[0], 0))
+            panel.heading("The object and its regions")
+        for number, points in spots[k].items():
+            panel.mark(points, str(number), size=12.0)
+        picture.paste(panel.image, (k * part[0], 0))
     _draw_legend(ImageDraw.Draw(picture), rows, (size[0], size[1] - foot))
     return picture
 
