@@ -24,10 +24,14 @@
 import tempfile
 from pathlib import Path
 
+import numpy as np
+from PIL import Image
+
 from geometry import RayCaster, dominant_regions, principal_curvatures
 from planning import RigPlan, load_mesh, load_rig, plan_rig, verify_plan
 from planning.cli.other_commands import write_sample
 from planning.report.drawing.face_colours import face_status, region_colours
+from planning.report.drawing.figures import region_directions
 from planning.report.drawing.picture_view import fitted
 from planning.report.drawing.rig_picture import draw_rig
 from planning.report.drawing.shader import Shader
@@ -49,9 +53,12 @@ f"{len(mesh.faces)} faces, {size[0]:.0f} x {size[1]:.0f} x {size[2]:.0f} mm"
 regions = dominant_regions(mesh, principal_curvatures(mesh))
 print(f"{len(regions)} regions, {regions.dominant_share:.1%} of the area")
 points = mesh.corners.reshape(-1, 3)
-view = fitted(points, [0.5, 1.0, -0.1], [0, 0, 1], (1000, 1200), margin_px=50)
 shader = Shader(RayCaster(mesh), region_colours(regions.face_region))
-shader.shade(view).reduce(2)
+# From the side that the regions look to.
+up = np.array([0.0, 0.0, 1.0])
+directions = region_directions(mesh, regions.face_region >= 0, up)
+views = [fitted(points, side, up, (1000, 1200), margin_px=50) for side in directions]
+Image.fromarray(np.hstack([shader.shade(view).reduce(2) for view in views]))
 
 # %% [markdown]
 # ## Plan
@@ -83,7 +90,11 @@ draw_rig(plan, face_status=face_status(plan))
 
 # %%
 check = plan.document.reconstruction
-print(check.accuracy_rms_m, check.accuracy_p95_m, check.predicted_missing)
+print(
+    f"rms {1e3 * check.accuracy_rms_m:.3f} mm, 95 % within "
+    f"{1e3 * check.accuracy_p95_m:.3f} mm, {check.predicted_missing:.2%} of what was "
+    f"promised is missing"
+)
 
 # %% [markdown]
 # A plan is two files. Whoever receives them can recompute every claim:

@@ -295,8 +295,8 @@ def _checked(
         timings_s=dict(clock.seconds),
         cost=cost_record(
             plan.document.rig,
-            plan.projectors,
-            plan.cameras,
+            plan.document.projectors,
+            plan.document.cameras,
             n_before=greedy,
             stages=clock.processor,
             scan=None if check is None else check.seconds,

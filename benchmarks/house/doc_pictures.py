@@ -22,8 +22,6 @@ from benchmarks.pictures import (
 )
 from benchmarks.pictures.job import IMAGES, Job
 
-_PALETTE = 160
-
 PICTURES: dict[str, Callable[[Job], Image.Image]] = {
     "ranges_body": measured_pictures.ranges,
     "missed": light_pictures.misses,
@@ -54,7 +52,7 @@ def main() -> int:
         job = Job(Path(folder))
         for name in names:
             picture = PICTURES[name](job)
-            palette = picture.convert("RGB").quantize(_PALETTE)
+            palette = picture.convert("RGB").quantize()
             palette.save(IMAGES / f"{name}.png", optimize=True)
             print(f"{name}: {picture.width} x {picture.height}")
     return 0

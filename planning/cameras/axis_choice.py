@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from planning.model.acquisition import pixels_read
 from planning.model.document.certificates import CamerasBy
 from planning.model.document.device_records import AxisTaken, RingAxis
 from planning.model.planned import PlannedCamera, PlannedProjector
@@ -134,7 +135,8 @@ def _with_rings_of(
     return replace(projector, world_from_ring=frame, ring_radii=template.ring_radii)
 
 
-def _burden(solution: CameraSolution) -> tuple[bool, int]:
-    """Smaller where the requirement is met, then where cameras are fewer."""
-    proof = solution.stage.certificate
-    return proof.status == "infeasible", len(solution.stage.cameras)
+def _burden(solution: CameraSolution) -> tuple[bool, int, int]:
+    """Smaller where the requirement is met, then with fewer cameras, then cheaper."""
+    cameras, proof = solution.stage.cameras, solution.stage.certificate
+    cost = pixels_read(solution.projectors, cameras)
+    return proof.status == "infeasible", len(cameras), cost

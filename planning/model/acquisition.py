@@ -1,7 +1,7 @@
 """How long a rig takes to record its sequences: frames, and the time that one takes."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from .planned import PlannedCamera, PlannedProjector, code_bits
 
@@ -9,16 +9,15 @@ from .planned import PlannedCamera, PlannedProjector, code_bits
 _ROUNDING = 1e-9
 
 
-def n_frames(projectors: Sequence[PlannedProjector], n_cameras: int) -> int:
-    """Return how many frames are shown, one projector after the other.
+def n_frames(n_rings: Iterable[int], n_cameras: int) -> int:
+    """Return how many frames projectors of so many rings show, one after the other.
 
-    Of each projector white, black, every bit of the annulus index with its inverse, and
-    for each camera the root disc with its inverse. Cameras record all at once::
+    Of each white, black, every bit of the annulus index with its inverse, and for each
+    camera the root disc with its inverse. Cameras record all at once::
 
         sum_p (2 + 2 ceil(log2(n_rings + 1)) + 2 n_cameras)
     """
-    bits = (code_bits(len(projector.ring_radii)) for projector in projectors)
-    return sum(2 + 2 * bit + 2 * n_cameras for bit in bits)
+    return sum(2 + 2 * code_bits(count) + 2 * n_cameras for count in n_rings)
 
 
 def pixels_read(
@@ -26,7 +25,8 @@ def pixels_read(
 ) -> int:
     """Return the part of eq. (8) that a plan alone decides: pixels times frames."""
     pixels = sum(math.prod(camera.device.resolution) for camera in cameras)
-    return pixels * n_frames(projectors, len(cameras))
+    rings = (len(projector.ring_radii) for projector in projectors)
+    return pixels * n_frames(rings, len(cameras))
 
 
 def frame_time(

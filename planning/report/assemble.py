@@ -64,6 +64,8 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
     overlaps, schedule = overlap_records(among, devices.projectors)
     surface = _surface(scene, devices)
     requirements = _final_requirements(among, claims, devices)
+    projectors = entries.projector_records(among, devices, partial.rings, claims)
+    cameras = entries.camera_records(among, devices.cameras, claims)
     rig = RigRecord(**partial.request.rig.to_document())
     document = PlanDocument(
         format=FORMAT,
@@ -78,8 +80,8 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
         rig=rig,
         requirements=requirements,
         regions=regions,
-        projectors=entries.projector_records(among, devices, partial.rings, claims),
-        cameras=entries.camera_records(among, devices.cameras, claims),
+        projectors=projectors,
+        cameras=cameras,
         ring_axes=entries.axes_record(among, partial, devices, claims),
         coverage=coverage,
         overlaps=overlaps,
@@ -93,8 +95,8 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
         ),
         cost=cost_record(
             rig,
-            devices.projectors,
-            devices.cameras,
+            projectors,
+            cameras,
             n_before=certificates.cameras.greedy_count,
             stages=clock.processor,
         ),

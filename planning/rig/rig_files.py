@@ -75,8 +75,8 @@ def read_rig(name_or_path: str | Path) -> RigTable:
             f"rig {name_or_path}",
             tomllib.loads(preset_text(str(name_or_path))),
         )
-    base = tables.pop("base", None)
-    if base is not None:
+    # A preset may itself be laid over another.
+    while (base := tables.pop("base", None)) is not None:
         if not isinstance(base, str) or base not in preset_names():
             raise RigError(
                 f"{where}: base = {base!r} must name a preset: "

@@ -290,6 +290,16 @@ def test_file_laid_over_a_preset_drops_the_sources_it_replaces(write):
     assert camera["range_m"][0] > load_rig().camera_device().range_m[0]
 
 
+def test_a_preset_that_is_laid_over_another_is_a_base_too(write):
+    rig = load_rig(write('base = "lee-krim-2014-fits"\n[camera]\nrange_mm = [1, 2000]'))
+    fits = load_rig("lee-krim-2014-fits")
+    assert rig.camera_device().range_m == (0.001, 2.0)
+    assert np.array_equal(
+        rig.camera_device().camera_matrix, fits.camera_device().camera_matrix
+    )
+    assert rig.light == "parallel"
+
+
 def test_named_device_replaces_the_presets_device_whole(write):
     table = read_rig(
         write(

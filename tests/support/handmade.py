@@ -196,6 +196,7 @@ def _cost(light: str) -> dict[str, Any]:
         "t5": 7.0,
         "n_cameras_before": 3,
         "C": frames / 30.0 + 614_400 * 1e-7 + 9.25,
+        "C_all_rings": frames / 30.0 + 614_400 * 1e-7 + 9.25,
         "C_before": before / 30.0 + 921_600 * 1e-7 + 9.25,
     }
 

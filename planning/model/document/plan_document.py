@@ -40,7 +40,7 @@ class CostRecord(Part):
         frame_s: Time of one; None: the rig doesn't say how fast its devices are.
         t1: None where `frame_s` is.
         t2: None: no check was made; likewise `t3` and `render_s`.
-        C: None where a term is.
+        C: None where a term is; likewise `C_before` and `C_all_rings`.
         render_s: What the simulated images took; no part of C.
     """
 
@@ -55,6 +55,7 @@ class CostRecord(Part):
     t3: float | None
     C: float | None
     C_before: float | None
+    C_all_rings: float | None = None
     render_s: float | None = None
 
 

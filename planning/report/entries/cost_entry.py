@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 from math import prod
 
 from planning.model.acquisition import frame_time, n_frames
+from planning.model.document.device_records import CameraRecord, ProjectorRecord
 from planning.model.document.input_records import RigRecord
 from planning.model.document.plan_document import CostRecord
-from planning.model.planned import PlannedCamera, PlannedProjector
 
 # What places light, with what that needs to know of the surface, is t4. All the rest of
 # planning is t5. The check is neither: t1 to t3 are of a scan, not of planning.
@@ -16,8 +16,8 @@ _CHECK = "check"
 
 def cost_record(
     rig: RigRecord,
-    projectors: Sequence[PlannedProjector],
-    cameras: Sequence[PlannedCamera],
+    projectors: Sequence[ProjectorRecord],
+    cameras: Sequence[CameraRecord],
     *,
     n_before: int,
     stages: Mapping[str, float],
@@ -32,8 +32,8 @@ def cost_record(
     t1 (acquisition: frames times the time of one) and t2 (pixels to points) are seconds
     a pixel, t3 (fusion), t4 (projector planning) and t5 (camera planning) seconds.
     C_before is the same with the cameras of the greedy cover, which is what D was
-    before it was minimised: each has its own pixels and root discs. What isn't known is
-    None, and C with it.
+    before it was minimised: each has its own pixels and root discs. C_all_rings has
+    the rings that were left out. What isn't known is None, and C with it.
 
     Args:
         rig: Says how fast its devices are.
@@ -43,10 +43,10 @@ def cost_record(
         stages: Measured processor times of the stages of planning [s].
         scan: Where a check was made those of `render`, `decode` and `merge` [s].
     """
-    pixels = sum(prod(camera.device.resolution) for camera in cameras)
-    shown = n_frames(projectors, len(cameras))
+    pixels = sum(prod(camera.resolution) for camera in cameras)
+    n_rings, frame_s = [len(one.ring_radii) for one in projectors], _frame_time(rig)
+    shown = n_frames(n_rings, len(cameras))
     t4 = sum(stages.get(name, 0.0) for name in _PROJECTOR_STAGES)
-    frame_s = _frame_time(rig)
     known = CostRecord(
         pixels=pixels,
         n_cameras_before=n_before,
@@ -66,15 +66,21 @@ def cost_record(
     known = known.changed(t2=t2, t3=t3, render_s=scan["render"])
     if frame_s is None:
         return known
-    C, C_before = (
-        n_frames(projectors, count) * frame_s
+    every = [
+        count + len(one.rings.left_out if one.rings else ())
+        for count, one in zip(n_rings, projectors, strict=True)
+    ]
+    totals = {
+        name: n_frames(rings, count) * frame_s
         + pixels * count / len(cameras) * t2
-        + t3
-        + known.t4
-        + known.t5
-        for count in (len(cameras), n_before)
-    )
-    return known.changed(C=C, C_before=C_before)
+        + (t3 + known.t4 + known.t5)
+        for name, rings, count in (
+            ("C", n_rings, len(cameras)),
+            ("C_before", n_rings, n_before),
+            ("C_all_rings", every, len(cameras)),
+        )
+    }
+    return known.changed(**totals)
 
 
 def _frame_time(rig: RigRecord) -> float | None:

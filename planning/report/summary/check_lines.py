@@ -1,9 +1,12 @@
 """What a plan says of its check from pixels and of its cost, for a person."""
 
 from planning.model.document.check_records import ReconstructionRecord
-from planning.model.document.plan_document import CostRecord
+from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
 from planning.model.words import count_words, error_words, labelled, percent
+
+# Sums of seconds that differ by less are the same [s].
+_EXACT = 1e-6
 
 
 def unchecked(plan: RigPlan) -> str:
@@ -52,22 +55,38 @@ def _agreement(check: ReconstructionRecord) -> list[str]:
     ]
 
 
-def cost_lines(cost: CostRecord) -> list[str]:
+def cost_lines(document: PlanDocument) -> list[str]:
     """Return eq. (8) with its terms, for a person."""
+    cost = document.cost
     if cost.frame_s is None:
         unknown = "frame_rate_hz of camera or projector, so eq. (8) has no t1"
         return labelled("COST", [f"the rig doesn't say {unknown}"])
     acquired = cost.n_frames * cost.frame_s
     scan = f"{cost.n_frames} frames of {1e3 * cost.frame_s:.1f} ms, {acquired:.2f} s"
-    if cost.C is None or cost.C_before is None or cost.t2 is None or cost.t3 is None:
+    if cost.C is None or cost.t2 is None or cost.t3 is None:
         return labelled("COST", [f"a scan is {scan}"])
-    saved, before = cost.C_before - cost.C, count_words(cost.n_cameras_before, "camera")
     lines = [
         f"a scan is {scan}; {1e-6 * cost.pixels:.1f} Mpx to points "
         f"{cost.pixels * cost.t2:.2f} s, merged {cost.t3:.2f} s",
         f"eq. (8), with planning of {cost.t4:.1f} + {cost.t5:.1f} s: "
         f"C = {cost.C:.1f} s",
-        f"{cost.C_before:.1f} s with the {before} of a greedy cover: minimising D "
-        f"{f'saved {saved:.1f} s' if saved > 0.0 else 'saved nothing'}",
     ]
+    left_out = sum(len(p.rings.left_out) for p in document.projectors if p.rings)
+    for other, what, how in (
+        (
+            cost.C_before,
+            f"with the {count_words(cost.n_cameras_before, 'camera')} of a greedy "
+            f"cover",
+            "minimising D",
+        ),
+        (
+            cost.C_all_rings if left_out else None,
+            f"with the {count_words(left_out, 'ring')} that would miss the object",
+            "leaving them out",
+        ),
+    ):
+        if other is not None:
+            saved = other - cost.C
+            won = f"saved {saved:.2f} s" if saved > _EXACT else "saved nothing"
+            lines.append(f"{other:.1f} s {what}: {how} {won}")
     return labelled("COST", lines)

@@ -1,19 +1,18 @@
 """What a plan says of its rings, and of estimated ranges, for a person."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from planning.model.acquisition import n_frames
 from planning.model.document.device_records import (
+    OtherRings,
     ProjectorRecord,
     RingSharesRecord,
     RingsRecord,
 )
 from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
-from planning.model.planned import PlannedProjector
 from planning.model.words import labelled, percent
 from planning.rings.ring_stage import tolerance_m
 
@@ -64,23 +63,23 @@ def _axes_lines(plan: RigPlan) -> list[str]:
         return []
     share = percent(areas.measured_m2 / areas.lit_m2)
     line = (
-        f"{axes.taken} axes: {_rings_words(plan, plan.projectors)}, {share} of the lit "
-        f"target measured"
+        f"{axes.taken} axes: {_rings_words(plan, plan.document.projectors)}, {share} "
+        f"of the lit target measured"
     )
     if axes.other is not None:
-        pairs = zip(plan.projectors, axes.other.projectors, strict=True)
-        others = [replace(p, ring_radii=np.array(o.ring_radii)) for p, o in pairs]
         line += (
             f"; {axes.other.axis} ones would measure "
             f"{percent(axes.other.measured_m2 / areas.lit_m2)} with "
-            f"{_rings_words(plan, others)}"
+            f"{_rings_words(plan, axes.other.projectors)}"
         )
     return [line]
 
 
-def _rings_words(plan: RigPlan, projectors: Sequence[PlannedProjector]) -> str:
-    n_rings = sum(len(projector.ring_radii) for projector in projectors)
-    return f"{n_rings} rings in {n_frames(projectors, len(plan.cameras))} frames"
+def _rings_words(
+    plan: RigPlan, projectors: Sequence[ProjectorRecord | OtherRings]
+) -> str:
+    counts = [len(projector.ring_radii) for projector in projectors]
+    return f"{sum(counts)} rings in {n_frames(counts, len(plan.cameras))} frames"
 
 
 def _notes(record: ProjectorRecord, tolerance_m: float) -> list[str]:

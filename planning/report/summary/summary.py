@@ -43,7 +43,7 @@ def summary(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
         *ring_lines(plan),
         *(() if plan.document.evaluation else marginal_lines(plan)),
         *check_lines(plan),
-        *(() if plan.document.evaluation else cost_lines(plan.document.cost)),
+        *(() if plan.document.evaluation else cost_lines(plan.document)),
         *(f"MISSED   {line}" for line in missed),
         *labelled("files", files),
     ]

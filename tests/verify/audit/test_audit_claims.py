@@ -86,6 +86,17 @@ def _entry(kind, index, name, value):
     return change
 
 
+LEAVES_OUT = {
+    "spacing": "uniform",
+    "kept_even": False,
+    "n_even": 70,
+    "gap_m": None,
+    "over_tolerance": 0.0,
+    "creases": {"length_m": 0.0, "max_error_m": 0.0},
+    "left_out": np.linspace(0.15, 0.2, 40).tolist(),
+}
+
+
 def _at(*path):
     *parents, last, value = path
 
@@ -437,6 +448,11 @@ FALSE = {
     ),
     "C": (_at("cost", "C", 5.0), "cost.C: claimed 5.0, but the sum of its terms is"),
     "C before": (_at("cost", "C_before", 5.0), "cost.C_before: claimed 5.0, but"),
+    "C of all rings": (_at("cost", "C_all_rings", 5.0), "cost.C_all_rings: claimed 5"),
+    "C without the rings left out": (
+        _at("projectors", 0, "rings", LEAVES_OUT),
+        "cost.C_all_rings: claimed",
+    ),
     "cameras before": (_at("cost", "n_cameras_before", 4), "greedy_count is 3"),
     "greedy": (_at("certificates", "cameras", "greedy_count", 2), "n_cameras_before"),
     "C without a term": (_at("cost", "t3", None), "the sum of its terms is None"),

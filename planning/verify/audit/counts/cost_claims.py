@@ -27,8 +27,13 @@ def audit_cost(case: AuditCase, findings: AuditFindings) -> None:
     truths = [("frame_s", frame_s, whose)]
     a_pixel = None if frame_s is None else frames * frame_s / max(pixels, 1)
     truths.append(("t1", a_pixel, "n_frames x frame_s / pixels"))
-    for name, number in (("C", count), ("C_before", before)):
-        acquired = None if frame_s is None else _frames(case.plan, number) * frame_s
+    for name, number, every in (
+        ("C", count, False),
+        ("C_before", before, False),
+        ("C_all_rings", count, True),
+    ):
+        shown = _frames(case.plan, number, left_out=every)
+        acquired = None if frame_s is None else shown * frame_s
         total = _total(cost, acquired, pixels * number / max(count, 1))
         truths.append((name, total, "the sum of its terms"))
     for name, truth, whose in truths:
@@ -36,11 +41,16 @@ def audit_cost(case: AuditCase, findings: AuditFindings) -> None:
         findings.same(name, getattr(cost, name), truth, whose, slack)
 
 
-def _frames(plan: RigPlan, n_cameras: int) -> int:
-    """White and black; a code for each annulus, a disc for each camera; inverses."""
+def _frames(plan: RigPlan, n_cameras: int, *, left_out: bool = False) -> int:
+    """White and black; a code for each annulus, a disc for each camera; inverses.
+
+    Perhaps with the rings that were left out.
+    """
     coded = 0
     for projector in plan.document.projectors:
         n_annuli = len(projector.ring_radii) + 1
+        if left_out and projector.rings is not None:
+            n_annuli += len(projector.rings.left_out)
         coded += math.ceil(math.log2(n_annuli)) + n_cameras + 1
     return 2 * coded
 
