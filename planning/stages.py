@@ -263,7 +263,7 @@ def as_they_stand(ready: Prepared, clock: Stopwatch) -> PartialPlan:
             scene, projectors, views, target, axis=asked, margin=margin
         )
         samples, measured = measured_of(scene, projectors, views, target)
-        cover = candidate_cover(scene, measured)
+        cover = candidate_cover(scene, measured, samples)
         proof = unproved(cover, target.samples.weight)
         camera_stage = CameraStage(
             {len(cameras): cameras},
@@ -307,7 +307,7 @@ def _standing(cover: CandidateCover) -> Selection:
     """The existing devices as a selection that nothing was proved of."""
     chosen = np.arange(cover.n_existing)
     n_covered = cover.n_covered(chosen)
-    met = n_covered >= cover.required
+    met = cover.enough(chosen)
     return Selection(
         chosen,
         chosen,

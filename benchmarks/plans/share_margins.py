@@ -39,7 +39,7 @@ from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import ProjectorStage, plan_projectors
 from planning.projectors.share_margin import margin_at_share
-from planning.proofs.selection import required_samples
+from planning.proofs.quotas import required_samples
 from planning.report.partial_plan import Prepared
 from planning.rings.axis_moves import AxisJudge
 from planning.scene.draws import Draw

@@ -115,7 +115,7 @@ def resolved_cover(
         scene, projectors, samples, cameras, cover.measured
     )
     selection = resolve_conflicts(
-        interference, candidate_cover(scene, cover.measured), cover.selection
+        interference, candidate_cover(scene, cover.measured, samples), cover.selection
     )
     if not len(selection.chosen):
         raise InfeasibleLimitsError(

@@ -10,6 +10,7 @@ from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.words import area_words
 from planning.proofs.conflicts import Interference
+from planning.proofs.quotas import RegionFloors
 from planning.proofs.selection import CandidateCover, Selection, select_fewest
 from planning.scene.bodies.clearance import candidates_with_clearance
 from planning.scene.camera_views import CandidateViews
@@ -101,7 +102,9 @@ def plan_cameras(
     """
 
     def choose(samples: LitSamples, measured: NDArray[np.bool_]) -> CameraCover:
-        selection = select_fewest(candidate_cover(scene, measured), known=known)
+        selection = select_fewest(
+            candidate_cover(scene, measured, samples), known=known
+        )
         return CameraCover(candidates, samples, measured, selection)
 
     return confirmed_cover(scene, projectors, candidates, choose)
@@ -127,9 +130,8 @@ def confirmed_cover(
         if cover.selection.status == "infeasible":
             return cover
         fresh = scene.target_samples(DRAWS.fresh_cameras.later(attempt))
-        _, seen = measured_of(scene, projectors, cover.candidates, fresh)
-        covered = seen[:, cover.selection.chosen].any(axis=1).sum()
-        if covered >= scene.requirements.coverage * seen.any(axis=1).sum():
+        lit, seen = measured_of(scene, projectors, cover.candidates, fresh)
+        if candidate_cover(scene, seen, lit).confirms(cover.selection.chosen):
             return cover
         target = merged(target, fresh)
         samples = lit_samples(scene, projectors, target)
@@ -169,8 +171,14 @@ def measured_of(
     return samples, measured_by(scene, candidates.cameras, samples, views)
 
 
-def candidate_cover(scene: Scene, measured: NDArray[np.bool_]) -> CandidateCover:
-    """Return what candidates measure, with what is required of cameras."""
+def candidate_cover(
+    scene: Scene, measured: NDArray[np.bool_], samples: LitSamples
+) -> CandidateCover:
+    """Return what candidates measure, with what is required of cameras.
+
+    Its `quotas.enough(covered)` says whether the samples measured, a mask of shape
+    (n,), are enough: the share of the target, and the floor of every large region.
+    """
     required = scene.requirements
     return CandidateCover(
         measured,
@@ -178,6 +186,7 @@ def candidate_cover(scene: Scene, measured: NDArray[np.bool_]) -> CandidateCover
         seed=scene.seed,
         max_count=required.max_cameras,
         n_existing=n_fixed(scene),
+        regions=RegionFloors.of(scene, samples.target),
     )
 
 

@@ -118,7 +118,7 @@ def _counts(by: CamerasBy, cover: CameraCover, why: str) -> RouteCounts:
     needed = cover.selection.needed
     if by != "paper":
         return RouteCounts(asked=by, cover=needed, paper=None, taken="cover", why=why)
-    met = cover.selection.n_covered >= cover.selection.required
+    met = cover.selection.status != "infeasible"
     count = needed if met or needed > len(cover.cameras) else None
     return RouteCounts(asked=by, cover=None, paper=count, taken="paper", why=why)
 
@@ -193,7 +193,7 @@ def _with_more(
     known = None
     if route is not None and route.needed is not None and route.needed < needed:
         known = route.by_count[route.needed]
-    elif needed <= fewest_count(candidate_cover(scene, measured)):
+    elif needed <= fewest_count(candidate_cover(scene, measured, cover.samples)):
         return cover
     again = cover_by_cover(scene, projectors, candidates, known)
     if again.selection.needed < needed:

@@ -85,6 +85,10 @@ def with_cameras(cover: CameraCover, before: CameraCover) -> CameraCover | None:
     count = int(measured.any(axis=1).sum())
     least = min(selection.required, selection.n_covered)
     least = max(least, int(np.ceil((1.0 - _SPARE) * selection.n_covered)))
+    if (floors := selection.floors) is not None:
+        kept = floors.as_far_as(np.any(cover.measured[:, selection.chosen], axis=1))
+        if not kept.enough(np.any(measured, axis=1)):
+            return None
     if len(chosen) != len(selection.chosen) or count < least:
         return None
     return replace(cover, selection=replace(selection, chosen=chosen, n_covered=count))

@@ -10,6 +10,7 @@ from planning.model.planned import PlannedCamera
 from planning.proofs.all_poses import BoundQuestion, Effort, joined, with_existing_alone
 from planning.proofs.camera_bound import bound_cameras
 from planning.proofs.candidate_certificate import PlannedStage, certified
+from planning.proofs.quotas import RegionFloors
 from planning.scene.measured import taken
 from planning.scene.scene import Scene
 
@@ -43,7 +44,7 @@ def camera_stage(
     scene: Scene, cover: CameraCover, routes: RouteCounts | None = None
 ) -> CameraStage:
     """Return the cameras of a cover, with the best ones for every other count."""
-    candidates = candidate_cover(scene, cover.measured)
+    candidates = candidate_cover(scene, cover.measured, cover.samples)
     others, proof = certified(
         candidates,
         cover.selection,
@@ -75,6 +76,7 @@ def bound_stage(
         free,
         scene.requirements.coverage,
         samples.target.samples.weight * n_samples,
+        RegionFloors.of(scene, samples.target).take(np.arange(n)),
     )
     lit = taken(samples, wanted, samples.lit)
     bound = bound_cameras(scene, device, lit, question, effort)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedProjector
+from planning.proofs.quotas import RegionFloors
 from planning.proofs.selection import CandidateCover
 from planning.scene.bodies.clearance import candidates_with_clearance, with_clearance
 from planning.scene.lighting import lit_stages
@@ -99,6 +100,7 @@ class CandidateSet:
             seed=self.scene.seed,
             max_count=required.max_projectors,
             n_existing=self.n_existing,
+            regions=RegionFloors.of(self.scene, self.samples),
         )
 
     def extended(self, more: tuple[PlannedProjector, ...]) -> "CandidateSet":

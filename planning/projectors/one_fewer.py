@@ -12,7 +12,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.proofs.selection import cover_problem, required_samples
+from planning.proofs.quotas import Quotas, RegionFloors
+from planning.proofs.selection import cover_problem
 from solvers import solve_max_coverage
 
 from .candidate_set import CandidateSet, CandidateSource
@@ -25,13 +26,16 @@ _SCALES = (1.0, 1.0, 0.5, 0.5, 0.25, 0.25, 0.125)
 _GAINS = 4
 # unless it is short by less than this: then each scale is tried.
 _NEAR = 0.015
+# With floors of regions a search goes on until so much of all is lit beyond what is
+# required, and a standard error beyond the floors: fresh samples should confirm it.
+_SPARE, _AIMED = 0.01, 1.0
 # Searches that start apart, each of which may end in a place of its own; and how many
 # where one of them came so near.
 _STARTS, _MOST_STARTS = 2, 4
 # Poses kept from round to round.
 _KEPT = 800
-# Counted work of each choice, of which no proof is asked.
-_BUDGET = 1e8
+# Counted work of each choice, of which no proof is asked; the latter with floors.
+_BUDGET, _FLOORED_BUDGET = 1e8, 3e8
 _NONE = np.empty(0, dtype=np.int64)
 
 
@@ -62,18 +66,19 @@ def one_fewer(
     n_lattice, nearest = len(lattice.projectors), np.inf
     for start in range(_MOST_STARTS):
         poses = _begin(lattice if start < _STARTS else finer(), start)
-        best, short = _NONE, np.inf
+        best, short, found = _NONE, np.inf, None
         for attempt, scale in enumerate((*_SCALES, None)):
             seed = lattice.scene.seed + start * (len(_SCALES) + 1) + attempt
-            best, missing, required = _most_lit(
+            best, missing, required, spared = _most_lit(
                 poses, n_projectors, reached, best, seed
             )
             movable = best[best >= poses.n_existing]
-            if missing <= 0:
-                return poses.take(movable)
+            found = poses.take(movable) if missing <= 0 else None
+            if found is not None and (spared or scale is None):
+                return found
             gain, short = short - missing, missing
             nearest = min(nearest, missing / required)
-            hopeful = missing <= min(_SHORT * required, _GAINS * gain)
+            hopeful = missing <= max(0, min(_SHORT * required, _GAINS * gain))
             if scale is None or not (hopeful or missing <= near * required):
                 break
             between = source.around(poses.of(movable), n_lattice, scale)
@@ -114,16 +119,23 @@ def _most_lit(
     reached: NDArray[np.bool_],
     start: NDArray[np.int64],
     seed: int,
-) -> tuple[NDArray[np.int64], int, int]:
-    """Return the poses that light most, what they miss, and what is required."""
+) -> tuple[NDArray[np.int64], int, int, bool]:
+    """Return the poses that light most, what they miss, and what is required.
+
+    Last whether fresh samples should confirm it.
+    """
+    share = poses.scene.requirements.dominant_coverage
+    regions = RegionFloors.of(poses.scene, poses.samples)
+    aims = Quotas.of(regions, reached, share, spare=_AIMED)
     best = solve_max_coverage(
-        cover_problem(poses.lit, 0, poses.n_existing),
+        cover_problem(poses.lit, aims, poses.n_existing),
         n_projectors,
         warm_start=start,
         seed=seed,
-        budget=_BUDGET,
+        budget=_FLOORED_BUDGET if regions.share else _BUDGET,
     ).selected
-    lit = poses.lit[:, best].any(axis=1)
-    share = poses.scene.requirements.dominant_coverage
-    required = required_samples(reached | lit, share)
-    return best, required - int(lit.sum()), required
+    lit = np.any(poses.lit[:, best], axis=1)
+    quotas = Quotas.of(regions, reached | lit, share)
+    spared = lit.sum() >= (1.0 + _SPARE) * quotas.total and aims.enough(lit)
+    spared = bool(spared) or not regions.share
+    return best, quotas.lacking(lit), quotas.total, spared

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from geometry.poses import inverse
 from planning.model.device_poses import moved_to
 from planning.model.planned import PlannedProjector
-from planning.proofs.selection import required_samples
+from planning.proofs.quotas import Quotas
 from planning.scene.bodies.clearance import lacks_clearance
 from planning.scene.lighting import lit_margins, lit_stages
 from planning.scene.limits import projector_limits
@@ -24,7 +24,7 @@ from solvers.poses.pose_problem import PoseProgram, pose_margins
 from solvers.poses.pose_program import pose_slack, solve_pose
 
 from .projector_stage import ProjectorStage
-from .share_margin import enough_lit, margin_at_share, widest_between
+from .share_margin import lit_by_any, margin_at_share, to_keep, widest_between
 
 _SWEEPS = 6
 # Gains below this aren't worth a move [rad].
@@ -47,23 +47,23 @@ def widen_margins(scene: Scene, stage: ProjectorStage) -> tuple[PlannedProjector
     projector in turn solves the pose program over those of them that are assigned to
     it. Occlusion isn't part of that program, so rays decide after every move: the whole
     way is tried, then half, then a quarter, and a move that lowers the margin at the
-    share isn't taken, nor one that leaves too few samples lit, nor one that lights what
-    no candidate does: what is required, and was proved, is a share of what they cover.
+    share isn't taken, nor one that leaves too few samples lit, of all or of a region
+    with a floor, nor one that lights what no candidate does: what is required, and was
+    proved, is a share of what they cover.
     """
     samples, reached = stage.candidates.samples, stage.candidates.reached
     state = _Lit(scene, samples, list(stage.projectors), reached)
-    lit = state.n_lit
-    required = required_samples(reached, scene.requirements.dominant_coverage)
     # With too few devices, what they light is what counts.
-    required = min(required, lit)
+    quotas = stage.candidates.cover.aims.as_far_as(lit_by_any(state.margin))
+    required, kept = quotas.total, to_keep(state.margin, quotas)
     if required == 0:
         return stage.projectors
     if not moves_bodies(state.projectors):
         # What bodies stand in the way of was settled for the poses chosen.
-        state = _between(state, required, lit, len(stage.reference))
+        state = _between(state, quotas, kept, len(stage.reference))
     for _ in range(_SWEEPS):
         moved = [
-            _improve(state, p, required, lit)
+            _improve(state, p, required, kept)
             for p, projector in enumerate(state.projectors)
             if not projector.existing
         ]
@@ -72,22 +72,24 @@ def widen_margins(scene: Scene, stage: ProjectorStage) -> tuple[PlannedProjector
     return tuple(state.projectors)
 
 
-def _between(state: "_Lit", required: int, lit: int, n_lattice: int) -> "_Lit":
+def _between(state: "_Lit", quotas: Quotas, kept: Quotas, n_lattice: int) -> "_Lit":
     """Projectors at poses between the candidates, if what counts has more margin."""
-    n = len(state.samples)
-    few = state.on(np.arange(0, n, -(-n // _SEARCHED)))
+    n, required = len(state.samples), quotas.total
+    some = np.arange(0, n, -(-n // _SEARCHED))
+    few = state.on(some)
+    on_few = quotas.part(some).as_far_as(lit_by_any(few.margin))
     offered = widest_between(
         state.scene,
         tuple(state.projectors),
         few.margins,
-        max(1, min(few.n_lit, required * len(few.samples) // n)),
+        replace(on_few, total=max(1, on_few.total)),
         n_lattice,
     )
     moved = state.with_all(list(offered))
     wider = margin_at_share(moved.margin, required) > margin_at_share(
         state.margin, required
     )
-    return moved if wider and enough_lit(moved.margin, required, lit) else state
+    return moved if wider and kept.enough(lit_by_any(moved.margin)) else state
 
 
 @dataclass(eq=False)
@@ -102,11 +104,6 @@ class _Lit:
 
     def __post_init__(self) -> None:
         self.margin = self._margins(self.projectors)
-
-    @property
-    def n_lit(self) -> int:
-        """Samples that any of them lights."""
-        return int(np.isfinite(self.margin).any(axis=1).sum())
 
     def on(self, chosen: NDArray[np.int64]) -> "_Lit":
         """The same projectors, on some of the samples."""
@@ -148,7 +145,7 @@ class _Lit:
         return self.margins(projectors)
 
 
-def _improve(state: _Lit, p: int, required: int, lit_before: int) -> bool:
+def _improve(state: _Lit, p: int, required: int, kept: Quotas) -> bool:
     """Move one projector to where what it is assigned of the share has more margin."""
     level = margin_at_share(state.margin, required)
     best = state.margin.max(axis=1)
@@ -178,7 +175,7 @@ def _improve(state: _Lit, p: int, required: int, lit_before: int) -> bool:
         if margin is None:
             continue
         wide = margin_at_share(margin, required) >= level
-        if wide and enough_lit(margin, required, lit_before):
+        if wide and kept.enough(lit_by_any(margin)):
             state.projectors[p], state.margin = offered, margin
             return True
     return False

@@ -177,7 +177,7 @@ def _with_widest_margin(candidates: CandidateSet, selection: Selection) -> Selec
     chosen = widest_selection(
         lit_margins(scene, candidates.projectors, candidates.samples, lit),
         selection.chosen,
-        selection.required,
+        candidates.cover.aims,
         seed=scene.seed,
         n_existing=candidates.n_existing,
     )

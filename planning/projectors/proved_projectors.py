@@ -14,6 +14,7 @@ from planning.proofs.all_poses import (
     with_existing_alone,
 )
 from planning.proofs.projector_bound import bound_projectors
+from planning.proofs.quotas import RegionFloors
 from planning.proofs.selection import fewest_count, select_fewest
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
@@ -81,6 +82,7 @@ def _bound_of(
         free,
         scene.requirements.dominant_coverage,
         samples.samples.weight * len(samples),
+        RegionFloors.of(scene, samples.take(np.arange(n))),
     )
     wanted = samples.take(np.flatnonzero(reached & ~free))
     return bound_projectors(scene, template, wanted, question, effort)

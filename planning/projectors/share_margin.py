@@ -15,11 +15,13 @@ so poses around the chosen ones are offered, from less and less far.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.planned import PlannedProjector
+from planning.proofs.quotas import Quotas
 from planning.proofs.selection import cover_problem
 from planning.scene.placed_bodies import movable
 from planning.scene.scene import Scene
@@ -49,16 +51,24 @@ def margin_at_share(margin: NDArray[np.float64], required: int) -> float:
     return float(np.partition(best, len(best) - required)[len(best) - required])
 
 
-def enough_lit(margin: NDArray[np.float64], required: int, before: int) -> bool:
-    """Return whether so many are lit that fresh samples should confirm it."""
-    lit = int(np.isfinite(margin).any(axis=1).sum())
-    return lit >= min(before, int(np.ceil((1.0 + _SPARE) * required)))
+def to_keep(margin: NDArray[np.float64], quotas: Quotas) -> Quotas:
+    """Return what must stay lit so that fresh samples should confirm the quotas.
+
+    That is some to spare of all, and the floors, as far as the margins are of so many.
+    """
+    spared = replace(quotas, total=int(np.ceil((1.0 + _SPARE) * quotas.total)))
+    return spared.as_far_as(lit_by_any(margin))
+
+
+def lit_by_any(margin: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which samples are lit, by their margins, shape (n,)."""
+    return np.any(np.isfinite(margin), axis=1)
 
 
 def widest_selection(
     margin: NDArray[np.float64],
     chosen: NDArray[np.int64],
-    required: int,
+    quotas: Quotas,
     *,
     seed: int,
     n_existing: int = 0,
@@ -68,18 +78,18 @@ def widest_selection(
     By steps that grow, then bisection: each cover program asks for most samples within
     a tighter limit.
     """
-    lit_before = int(np.isfinite(margin[:, chosen]).any(axis=1).sum())
+    kept, required = to_keep(margin[:, chosen], quotas), quotas.total
     best, low = chosen, margin_at_share(margin[:, chosen], required)
     high = margin_at_share(margin, required)
     step = 2.0 * _STEP_RAD
     while high - low > _STEP_RAD:
         level = min(0.5 * (low + high), low + step)
-        problem = cover_problem(margin >= level, required, n_existing)
+        problem = cover_problem(margin >= level, quotas, n_existing)
         selected = solve_max_coverage(
             problem, len(chosen), warm_start=best, seed=seed, budget=_BUDGET
         ).selected
         reached = margin_at_share(margin[:, selected], required)
-        if reached >= level and enough_lit(margin[:, selected], required, lit_before):
+        if reached >= level and kept.enough(lit_by_any(margin[:, selected])):
             best, low, step = selected, reached, 2.0 * step
         else:
             high = level
@@ -90,7 +100,7 @@ def widest_between(
     scene: Scene,
     projectors: tuple[PlannedProjector, ...],
     margins: Callable[[tuple[PlannedProjector, ...]], NDArray[np.float64]],
-    required: int,
+    quotas: Quotas,
     n_lattice: int,
 ) -> tuple[PlannedProjector, ...]:
     """Return as many projectors at poses of larger margin, where there are any."""
@@ -104,7 +114,7 @@ def widest_between(
         chosen = widest_selection(
             margin,
             np.arange(len(projectors)),
-            required,
+            quotas,
             seed=scene.seed,
             n_existing=n_existing,
         )

@@ -10,7 +10,7 @@ from solvers.cells.cell_bound import CellBound, CellStatus, bound_count
 from solvers.cells.cell_problem import CellProblem
 from solvers.cells.cell_tree import CellTree
 
-from .selection import required_samples
+from .quotas import Quotas, RegionFloors
 
 
 @dataclass(frozen=True)
@@ -50,6 +50,7 @@ class BoundQuestion:
 
     Attributes:
         required: Samples to be covered, of those that existing devices don't cover.
+        floors: The same of each region; of which each sample is, is `regions`, (n,).
         count: Devices that are enough for that.
         n_samples: Samples of the target from which they are.
         sample_area_m2: Area that each of them stands for.
@@ -63,6 +64,8 @@ class BoundQuestion:
     sample_area_m2: float
     n_existing: int = 0
     n_free: int = 0
+    floors: tuple[int, ...] = ()
+    regions: NDArray[np.int64] | None = None
 
     @classmethod
     def about(
@@ -72,27 +75,45 @@ class BoundQuestion:
         free: NDArray[np.bool_],
         share: float,
         area_m2: float,
+        regions: RegionFloors,
     ) -> "BoundQuestion":
         """Return the question that a certificate over candidates leaves open.
 
         The samples reached, and those of them that existing devices cover, are (n,);
         all n stand for `area_m2`.
         """
-        n_free = int(free.sum())
+        n_free, quotas = int(free.sum()), Quotas.of(regions, reached, share)
+        floors = np.clip(quotas.floors - regions.counts(free), 0, None)
         return cls(
-            max(required_samples(reached, share) - n_free, 0),
+            max(quotas.total - n_free, 0),
             certificate.needed.count - certificate.given,
             len(reached),
             area_m2 / len(reached),
             certificate.given,
             n_free,
+            tuple(floors.tolist()),
+            regions.row[reached & ~free],
         )
 
     def searched(self, tree: CellTree, budget: float) -> CellBound:
-        """Return what a search over cells of poses proves."""
+        """Return what a search over cells of poses proves.
+
+        What is required of all alone comes first: what it proves holds with floors.
+        """
         required = np.array([float(self.required)])
         problem = CellProblem(np.ones(tree.n_rows), required)
-        return bound_count(problem, tree, self.count, budget=budget)
+        bound = bound_count(problem, tree, self.count, budget=budget)
+        if bound.status is CellStatus.PROVED or not any(self.floors):
+            return bound
+        floored = CellProblem(
+            np.ones(tree.n_rows),
+            np.array(self.floors, dtype=np.float64),
+            None,  # pyright: ignore[reportArgumentType]
+            self.regions,  # pyright: ignore[reportArgumentType]
+            float(self.required),
+        )
+        again = bound_count(floored, tree, self.count, budget=budget)
+        return again if again.lower_bound > bound.lower_bound else bound
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +137,8 @@ class ContinuousBound:
         """Return the plan's `continuous` of a certificate."""
         found, question = self.found, self.question
         most = found.most_weight
-        if found.status is CellStatus.PROVED:
+        by_total = found.problem.required_total is None
+        if found.status is CellStatus.PROVED and by_total:
             # Fewer fall short of what is required, by a sample at least.
             most = min(most, float(found.problem.required_weight[0]) - 1.0)
         return ContinuousProof(

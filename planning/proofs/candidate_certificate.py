@@ -31,7 +31,7 @@ def unproved(cover: CandidateCover, sample_area_m2: float) -> Certificate:
     """
     count = cover.n_existing
     covered = cover.n_covered(np.arange(count))
-    area, met = covered * sample_area_m2, covered >= cover.required
+    area, met = covered * sample_area_m2, cover.enough(np.arange(count))
     return Certificate(
         count=count,
         status="feasible" if met else "infeasible",

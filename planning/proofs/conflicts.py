@@ -22,6 +22,7 @@ from planning.scene.placed_bodies import (
 )
 from solvers.covers.cover import solve_max_coverage
 
+from .quotas import Quotas
 from .selection import MORE, CandidateCover, Marginals, Selection, cover_problem
 
 # Counted work of each completion, of which no proof is asked.
@@ -87,21 +88,22 @@ def resolve_conflicts(
     """
     if not among.bodied:
         return selection
-    chosen, required = selection.chosen, min(selection.required, selection.n_covered)
-    most = cover.max_count
+    chosen, most = selection.chosen, cover.max_count
+    quotas = cover.quotas.as_far_as(cover.covered(chosen))
     more = max(len(chosen), selection.needed) + MORE
-    spare = max(selection.n_covered - required, int((1.0 - _HELD) * required))
-    demand = _Demand(required, spare, more if most is None else most)
-    resolved, covered = _compatible(among, cover, chosen, demand)
+    spare = max(selection.n_covered - quotas.total, int((1.0 - _HELD) * quotas.total))
+    demand = _Demand(quotas, spare, more if most is None else most)
+    resolved, held = _compatible(among, cover, chosen, demand)
+    covered = int(held.sum())
     if np.array_equal(resolved, np.sort(chosen)) and covered == selection.n_covered:
         return selection
-    smallest, met = resolved, covered >= selection.required
+    smallest, met = resolved, cover.quotas.enough(held)
     costlier = len(resolved) > selection.needed
     if not met:
         # How many would do it, were more allowed.
-        demand = replace(demand, required=selection.required, most=more)
+        demand = replace(demand, quotas=cover.quotas, most=more)
         enough, there = _compatible(among, cover, selection.smallest, demand)
-        cover_found = there >= selection.required
+        cover_found = cover.quotas.enough(there)
         fewest = enough if cover_found else selection.smallest
         smallest = max((fewest, resolved), key=len)
         costlier |= not cover_found or len(enough) > selection.needed
@@ -130,22 +132,23 @@ def resolve_others(
     by_count, n_covered = dict(others.by_count), dict(others.n_covered)
     for count, chosen in others.by_count.items():
         if count != taken:
-            before = cover.n_covered(chosen)
-            held = int(_HELD * before)
-            demand = _Demand(held, before - held, count)
+            before = cover.covered(chosen)
+            held = int(_HELD * int(before.sum()))
+            quotas = replace(cover.quotas.as_far_as(before), total=held)
+            demand = _Demand(quotas, int(before.sum()) - held, count)
             by_count[count], after = _compatible(among, cover, chosen, demand)
-            n_covered[count] = after, n_covered[count][1]
+            n_covered[count] = int(after.sum()), n_covered[count][1]
     return replace(others, by_count=by_count, n_covered=n_covered)
 
 
 @dataclass(frozen=True)
 class _Demand:
-    """What compatible candidates must do, in samples, and how many are allowed.
+    """What compatible candidates must cover, and how many are allowed.
 
-    One of them may take `spare` from those that stood before it.
+    One of them may take `spare` samples from those that stood before it.
     """
 
-    required: int
+    quotas: Quotas
     spare: int
     most: int
 
@@ -155,18 +158,18 @@ def _compatible(
     cover: CandidateCover,
     chosen: NDArray[np.int64],
     demand: _Demand,
-) -> tuple[NDArray[np.int64], int]:
-    """Return compatible candidates, and how many samples they cover."""
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Return compatible candidates, and which samples they cover, (n,)."""
     standing = list(range(cover.n_existing))
     every = list(range(cover.covers.shape[1]))
     tried = [int(i) for i in chosen]
-    best, n_best = standing, -1
+    best: tuple[list[int], NDArray[np.bool_]] | None = None
     while True:
-        n_covered = int(among.covers(tried, tried).any(axis=1).sum())
+        covered = np.any(among.covers(tried, tried), axis=1)
         if among.stand_together(tried):
-            if n_covered > n_best:
-                best, n_best = tried, n_covered
-            if n_covered >= demand.required:
+            if best is None or _better(demand.quotas, covered, best[1]):
+                best = tried, covered
+            if demand.quotas.enough(covered):
                 break
         waiting = [i for i in tried if i not in standing]
         if waiting:
@@ -179,9 +182,19 @@ def _compatible(
         if not waiting and completed == tried:
             break
         tried = completed
-    if n_best < 0:
-        n_best = int(among.covers(best, best).any(axis=1).sum())
-    return np.array(sorted(best), dtype=np.int64), n_best
+    if best is None:
+        existing = list(range(cover.n_existing))
+        best = existing, np.any(among.covers(existing, existing), axis=1)
+    chosen_best, held = best
+    return np.array(sorted(chosen_best), dtype=np.int64), held
+
+
+def _better(
+    quotas: Quotas, covered: NDArray[np.bool_], than: NDArray[np.bool_]
+) -> bool:
+    """Return whether samples covered are less lacking than others, or as much more."""
+    new, old = ((-quotas.lacking(c), int(c.sum())) for c in (covered, than))
+    return new > old
 
 
 def _harmless(
@@ -208,12 +221,13 @@ def _completed(
     seed: int,
 ) -> list[int]:
     """Return the candidates that stand, with others to cover what is required."""
-    problem = replace(cover_problem(covers, 0), fixed=np.array(standing, np.int64))
+    problem = cover_problem(covers, demand.quotas)
+    problem = replace(problem, fixed=np.array(standing, np.int64))
     taken = np.array(standing, dtype=np.int64)
     least = min(max(len(standing), len(tried)), demand.most)
     for count in range(least, demand.most + 1):
         taken = solve_max_coverage(problem, count, seed=seed, budget=_BUDGET).selected
-        if covers[:, taken].any(axis=1).sum() >= demand.required:
+        if demand.quotas.enough(np.any(covers[:, taken], axis=1)):
             break
     useful = np.asarray(covers.any(axis=0))
     return sorted(i for i in map(int, taken) if useful[i] or i in standing)

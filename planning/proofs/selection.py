@@ -14,12 +14,21 @@ from numpy.typing import NDArray
 from solvers import CoverProblem, solve_cover
 from solvers.bit_rows import sparse_rows
 from solvers.covers.bounds.reductions import ReducedCover
-from solvers.covers.cover import DEFAULT_BUDGET, reduced_problem, solve_max_coverage
+from solvers.covers.cover import (
+    DEFAULT_BUDGET,
+    MaxCoverageSolution,
+    reduced_problem,
+    solve_max_coverage,
+)
+
+from .quotas import Quotas, RegionFloors
 
 # Counts beyond the one taken for which the best candidates are reported.
 MORE = 2
 # Counted work for the marginal table's other counts, where no proof is claimed.
 _MARGINAL_BUDGET = 3e8
+# Standard errors above the floors of regions at which selections aim.
+_AIMED = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,11 +41,13 @@ class Selection:
         lower_bound: Proven least number of candidates for these samples.
         status: `optimal`, `feasible` or `infeasible`.
         proof: What proves the bound.
-        required: Samples that must be covered.
+        required: Samples that must be covered, of regions and all.
         n_covered: Most samples that k candidates were found to cover.
         n_covered_bound: Proven upper bound on that.
+        total_bound: The part of the lower bound that holds without floors of regions.
         but_for_bodies: How many would do if bodies didn't collide or stand in each
             other's way, where that costs more or leaves too little; else None.
+        floors: What must be covered, where regions have floors; else None.
     """
 
     chosen: NDArray[np.int64]
@@ -47,7 +58,9 @@ class Selection:
     required: int
     n_covered: int
     n_covered_bound: int
+    total_bound: int = 0
     but_for_bodies: int | None = None
+    floors: Quotas | None = None
 
     @property
     def needed(self) -> int:
@@ -81,6 +94,7 @@ class CandidateCover:
         seed: Of the heuristics.
         max_count: Candidates allowed; None for no limit.
         n_existing: First candidates that are taken whatever they cover.
+        regions: Floors of regions; None: there are none.
     """
 
     covers: NDArray[np.bool_]
@@ -88,30 +102,62 @@ class CandidateCover:
     seed: int = 0
     max_count: int | None = None
     n_existing: int = 0
+    regions: RegionFloors | None = None
+
+    @cached_property
+    def quotas(self) -> Quotas:
+        """Samples that must be covered."""
+        return self._quotas(0.0)
+
+    @cached_property
+    def aims(self) -> Quotas:
+        """The same with floors so high that fresh samples should confirm them."""
+        return self._quotas(_AIMED)
 
     @property
     def required(self) -> int:
-        """Samples that must be covered."""
-        return required_samples(np.any(self.covers, axis=1), self.share)
+        """Samples that must be covered, of regions and all."""
+        return self.quotas.total
 
     @cached_property
     def problem(self) -> CoverProblem:
         """The cover over the samples that some candidate covers."""
-        return cover_problem(self.covers, self.required, self.n_existing)
+        return cover_problem(self.covers, self.quotas, self.n_existing)
 
     @cached_property
     def reduced(self) -> ReducedCover:
         """The same, reduced once for every count that is looked at."""
         return reduced_problem(self.problem)
 
+    @cached_property
+    def _aimed(self) -> ReducedCover:
+        if np.array_equal(self.aims.floors, self.quotas.floors):
+            return self.reduced
+        aimed = cover_problem(self.covers, self.aims, self.n_existing)
+        return reduced_problem(aimed)
+
+    def _quotas(self, spare: float) -> Quotas:
+        regions = self.regions or RegionFloors.none(len(self.covers))
+        reached = np.any(self.covers, axis=1)
+        return Quotas.of(regions, reached, self.share, spare=spare)
+
+    def covered(self, chosen: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return which samples candidates cover together, shape (n,)."""
+        return np.any(self.covers[:, chosen], axis=1)
+
     def n_covered(self, chosen: NDArray[np.int64]) -> int:
         """Return how many samples candidates cover together."""
-        return int(self.covers[:, chosen].any(axis=1).sum())
+        return int(self.covered(chosen).sum())
+
+    def enough(self, chosen: NDArray[np.int64]) -> bool:
+        """Return whether candidates cover the share and the floors of all regions."""
+        return self.quotas.enough(self.covered(chosen))
 
     def confirms(self, chosen: NDArray[np.int64]) -> bool:
-        """Return whether candidates cover the share; of samples that are fresh."""
+        """Return whether candidates cover enough of samples that are fresh."""
         reached = self.covers.any(axis=1).sum()
-        return bool(self.n_covered(chosen) >= self.share * reached)
+        total = bool(self.n_covered(chosen) >= self.share * reached)
+        return total and self.enough(chosen)
 
     def most_covering(
         self,
@@ -119,16 +165,28 @@ class CandidateCover:
         warm_start: NDArray[np.int64] | None,
         budget: float = DEFAULT_BUDGET,
     ) -> tuple[NDArray[np.int64], int]:
-        """Return the candidates that cover most, and the proven most of so many."""
-        best = solve_max_coverage(
-            self.problem,
-            count,
-            warm_start=warm_start,
-            seed=self.seed,
-            budget=budget,
-            reduced=self.reduced,
-        )
-        return best.selected, int(np.floor(best.upper_bound + 1e-6))
+        """Return the candidates that cover most, and the proven most of so many.
+
+        Of those that aim above the floors, else of those that meet them, else of those
+        that lack least; the bound is of any.
+        """
+
+        def among(reduced: ReducedCover) -> MaxCoverageSolution:
+            return solve_max_coverage(
+                reduced.problem,
+                count,
+                warm_start=warm_start,
+                seed=self.seed,
+                budget=budget,
+                reduced=reduced,
+            )
+
+        best = among(self._aimed)
+        selected, bound = best.selected, int(np.floor(best.total_bound + 1e-6))
+        known = warm_start is not None and self.enough(warm_start)
+        if known and not self.enough(selected):
+            selected = among(self.reduced).selected
+        return selected, bound
 
 
 def select_fewest(
@@ -137,7 +195,7 @@ def select_fewest(
     known: NDArray[np.int64] | None = None,
     budget: float = DEFAULT_BUDGET,
 ) -> Selection:
-    """Return the fewest candidates that cover the required share.
+    """Return the fewest candidates that cover the required share, and the floors.
 
     After the count is known, the selection that covers most at that count is taken.
 
@@ -152,7 +210,7 @@ def select_fewest(
     )
     smallest, required = solution.selected, cover.required
     if known is not None and len(known) < len(smallest):
-        smallest = known if cover.n_covered(known) >= required else smallest
+        smallest = known if cover.enough(known) else smallest
     needed = len(smallest)
     lower_bound = int(np.ceil(solution.lower_bound - 1e-9))
     allowed = needed if cover.max_count is None else min(needed, cover.max_count)
@@ -160,7 +218,7 @@ def select_fewest(
         allowed, smallest if allowed == needed else None
     )
     n_covered = cover.n_covered(chosen)
-    met = needed <= allowed and n_covered >= required
+    met = needed <= allowed and cover.enough(chosen)
     proved = "optimal" if lower_bound >= needed else "feasible"
     return Selection(
         chosen,
@@ -171,17 +229,14 @@ def select_fewest(
         required,
         n_covered,
         bound,
+        min(int(np.ceil(solution.total_bound - 1e-9)), needed),
+        floors=cover.quotas if cover.quotas.floors.any() else None,
     )
 
 
 def fewest_count(cover: CandidateCover) -> int:
     """Return how many candidates `select_fewest` takes, and spend nothing on which."""
     return len(solve_cover(cover.problem, seed=cover.seed, heaviest=False).selected)
-
-
-def required_samples(reached: NDArray[np.bool_], share: float) -> int:
-    """Return how many samples a share of those that any candidate covers is."""
-    return int(np.ceil(share * int(reached.sum()) - 1e-9))
 
 
 def marginals(cover: CandidateCover, selection: Selection) -> Marginals:
@@ -201,7 +256,7 @@ def marginals(cover: CandidateCover, selection: Selection) -> Marginals:
                 selection.smallest if count == selection.needed else best,
                 DEFAULT_BUDGET if count == taken - 1 else _MARGINAL_BUDGET,
             )
-            if count < selection.lower_bound:
+            if count < selection.total_bound:
                 # Where so many are proved too few, they fall short of the requirement.
                 bound = min(bound, selection.required - 1)
             n_covered[count] = cover.n_covered(best), bound
@@ -210,29 +265,41 @@ def marginals(cover: CandidateCover, selection: Selection) -> Marginals:
 
 
 def cover_problem(
-    covers: NDArray[np.bool_], required: int, n_existing: int = 0
+    covers: NDArray[np.bool_], required: int | Quotas, n_existing: int = 0
 ) -> CoverProblem:
     """State the cover over the samples that some candidate covers.
 
     Args:
         covers: Whether a candidate (column) covers a sample (row), shape (n, m).
-        required: Samples that must be covered.
+        required: Samples that must be covered, perhaps with floors of regions.
         n_existing: First candidates that are taken whatever they cover.
     """
-    reachable = covers[covers.any(axis=1)]
-    return CoverProblem(
-        sparse_rows(reachable),
-        required_weight=np.array([required]),
-        fixed=np.arange(n_existing),
-    )
+    reached = covers.any(axis=1)
+    rows, fixed = sparse_rows(covers[reached]), np.arange(n_existing)
+    if isinstance(required, Quotas) and required.floors.any():
+        regions = required.regions.row[reached]
+        return CoverProblem(
+            rows,
+            # The last may have no row that any candidate covers.
+            required_weight=required.floors[: regions.max(initial=0) + 1].astype(float),
+            required_total=required.total,
+            row_sets=regions,
+            fixed=fixed,
+        )
+    total = required.total if isinstance(required, Quotas) else required
+    return CoverProblem(rows, required_weight=np.array([total]), fixed=fixed)
 
 
 def _greedy_count(cover: CandidateCover) -> int:
-    """How many candidates it takes when each adds most samples, lower index first."""
+    """How many candidates it takes when each adds most samples, lower index first.
+
+    Of samples that are lacking: of any while the total is, then of regions' alone.
+    """
     covers, count = cover.covers, cover.n_existing
-    uncovered = ~covers[:, :count].any(axis=1)
-    while len(covers) - uncovered.sum() < cover.required:
-        best = int(np.argmax(covers[uncovered].sum(axis=0)))
+    uncovered = ~np.any(covers[:, :count], axis=1)
+    while not cover.quotas.enough(~uncovered):
+        wanted = uncovered & cover.quotas.wanted(~uncovered)
+        best = int(np.argmax(covers[wanted].sum(axis=0)))
         uncovered &= ~covers[:, best]
         count += 1
     return count

@@ -98,6 +98,7 @@ class MaxCoverageSolution:
         selected: Chosen sets in increasing order, at most ``n_sets``.
         upper_bound: Weight that no ``n_sets`` sets exceed.
         proof: What proves the bound, and what cut the proof short if anything did.
+        total_bound: The same of sets that needn't meet the floors.
     """
 
     problem: CoverProblem
@@ -106,6 +107,7 @@ class MaxCoverageSolution:
     selected: NDArray[np.int64]
     upper_bound: float
     proof: str
+    total_bound: float
 
     @property
     def covered_weight(self) -> float:
@@ -231,13 +233,12 @@ def solve_max_coverage(
     covered = problem.covered_weight(selected)
     optimal = answer.status is SolveStatus.OPTIMAL
     upper = (cover.settled + answer.bound) * cover.unit
+    upper = covered if optimal else max(covered, upper)
+    free_upper = upper
+    if answer.total_bound is not None:
+        free_upper = max(upper, (cover.settled + answer.total_bound) * cover.unit)
     return MaxCoverageSolution(
-        problem,
-        n_sets,
-        answer.status,
-        selected,
-        covered if optimal else max(covered, upper),
-        answer.proof,
+        problem, n_sets, answer.status, selected, upper, answer.proof, free_upper
     )
 
 

@@ -166,9 +166,10 @@ def _of_floored(
         best, weight, met = answer.selected, answer.weight, True
     if met and answer.complete:
         proof = f"{group_proof(n_sets)}, {FLOORS_COUNTED}"
-        return Answer(SolveStatus.OPTIMAL, best, weight, proof)
+        return Answer(SolveStatus.OPTIMAL, best, weight, proof, free.bound)
     upper = max(weight, min(free.bound, answer.upper_bound)) if met else free.bound
-    return Answer(SolveStatus.FEASIBLE, best, upper, cut_short(free.proof, budget))
+    proof = cut_short(free.proof, budget)
+    return Answer(SolveStatus.FEASIBLE, best, upper, proof, free.bound)
 
 
 def _of_any(

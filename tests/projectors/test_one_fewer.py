@@ -15,6 +15,7 @@ from geometry.shapes.primitives import sphere
 from planning.projectors.candidate_set import CandidateSet, CandidateSource
 from planning.projectors.one_fewer import one_fewer
 from planning.projectors.share_margin import margin_at_share, widest_between
+from planning.proofs.quotas import Quotas, RegionFloors
 from planning.proofs.selection import select_fewest
 from planning.rig.rig import load_rig
 from planning.rings.ring_radii import uniform_radii
@@ -119,13 +120,14 @@ def test_margins_grow_between_the_poses_of_a_lattice(lattice):
     start = offer.projectors[:3]
     required = int((margins(start) > -np.inf).any(axis=1).sum())
     before = margin_at_share(margins(start), required)
-    moved = widest_between(scene, start, margins, required, len(offer.projectors))
+    quotas = Quotas(required, RegionFloors.none(len(rows)), np.zeros(1, dtype=int))
+    moved = widest_between(scene, start, margins, quotas, len(offer.projectors))
     after = margin_at_share(margins(moved), required)
     assert len(moved) == 3
     assert after > before + np.radians(1.0)
     stands = replace(start[0], existing="P0")
     kept = widest_between(
-        scene, (stands, *start[1:]), margins, required, len(offer.projectors)
+        scene, (stands, *start[1:]), margins, quotas, len(offer.projectors)
     )
     assert kept[0] is stands
     assert all(not projector.existing for projector in kept[1:])

@@ -13,7 +13,8 @@ from planning.model.planned import PlannedProjector
 from planning.projectors.candidate_set import CandidateSet
 from planning.projectors.projector_poses import _between, widen_margins
 from planning.projectors.projector_stage import ProjectorStage, plan_projectors
-from planning.projectors.share_margin import margin_at_share
+from planning.projectors.share_margin import margin_at_share, to_keep
+from planning.proofs.quotas import Quotas, RegionFloors
 from planning.rig.rig import load_rig
 from planning.rings.ring_radii import uniform_radii
 from planning.scene.draws import Draw
@@ -124,7 +125,6 @@ def test_poses_between_are_taken_if_wider_with_light_to_spare(
 
         def __init__(self, margin):
             self.margin = margin[:, None]
-            self.n_lit = np.isfinite(margin).sum()
 
         def on(self, some):
             return State(self.margin[some, 0])
@@ -136,5 +136,7 @@ def test_poses_between_are_taken_if_wider_with_light_to_spare(
         "planning.projectors.projector_poses.widest_between", lambda *given: ("Q",)
     )
     state = State(np.where(np.arange(1000) < 940, 0.2, -np.inf))
-    found = _between(state, 900, 940, 640)
+    quotas = Quotas(900, RegionFloors.none(1000), np.zeros(1, dtype=int))
+    kept = to_keep(state.margin, quotas)
+    found = _between(state, quotas, kept, 640)
     assert (found is not state) is taken

@@ -25,7 +25,8 @@ from planning.cameras.camera_cover import (
 )
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.proofs.selection import Selection, required_samples
+from planning.proofs.quotas import required_samples
+from planning.proofs.selection import Selection
 from planning.scene.bodies.clearance import with_clearance
 from planning.scene.camera_views import CandidateViews
 from planning.scene.draws import DRAWS
@@ -234,14 +235,14 @@ def cover_of(
         route.candidates,
         samples,
         route.measured,
-        _selection(scene, route),
+        _selection(scene, samples, route),
         among,
         route.by_count,
     )
 
 
-def _selection(scene: Scene, route: RouteCameras) -> Selection:
-    cover = candidate_cover(scene, route.measured)
+def _selection(scene: Scene, samples: LitSamples, route: RouteCameras) -> Selection:
+    cover = candidate_cover(scene, route.measured, samples)
     bound = solve_cover(cover.problem, seed=scene.seed, heaviest=False)
     needed = route.best
     least = min(int(np.ceil(bound.lower_bound - 1e-9)), needed)

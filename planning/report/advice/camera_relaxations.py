@@ -17,7 +17,7 @@ from planning.cameras.proved_cameras import CameraStage
 from planning.model.document.coverage_records import Relaxation
 from planning.model.planned import PlannedCamera
 from planning.model.words import percent
-from planning.proofs.selection import required_samples
+from planning.proofs.quotas import required_samples
 from planning.report.claims import Claims
 from planning.report.judged import Devices
 from planning.report.reach import measured_by_any

@@ -14,7 +14,7 @@ from planning.model.document.coverage_records import Relaxation
 from planning.model.planned import PlannedProjector
 from planning.projectors.candidate_set import NothingLitError
 from planning.projectors.projector_stage import ProjectorStage
-from planning.proofs.selection import required_samples
+from planning.proofs.quotas import required_samples
 from planning.report.reach import furthest_lit
 from planning.scene.draws import DRAWS
 from planning.scene.limits.projector_limits import LIT

@@ -158,7 +158,7 @@ def _model(
         )
         if cover.quota > 0:
             groups = _stack([[groups], [sparse.csr_array(weights.reshape(1, -1))]])
-        needed = needed[: groups.shape[0]]
+        needed = needed if cover.quota > 0 else needed[:-1]
         link = _stack([[link, service], [None, groups]])
         lower = np.concatenate([np.zeros(n_e), needed])
         cost = np.concatenate(

@@ -22,14 +22,14 @@ from solvers.covers.bounds.reductions import PRICE_BITS, ReducedCover
 from solvers.covers.bounds.relaxation import coverage_bounds
 from solvers.status import WorkBudget
 
-from .neighbourhood import FIRST_MOVES, most_coverage
+from .neighbourhood import most_coverage
 
 # U where there are floors, and the largest price.
 _UNIT, _DEAREST = 16.0, float(1 << PRICE_BITS)
 # Prices tried, and how many of these bounds are asked of.
 _ROUNDS, _BOUNDED = 12, 4
-# A price that was too low grows by this factor.
-_RISE = 2.0
+# A price that was too low grows by this factor, and how many moves each is worth.
+_RISE, _MOVES = 4.0, 30
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +110,7 @@ def least_shortage(
             budget,
             target=np.inf,
             seed=seed + attempt,
-            max_moves=FIRST_MOVES,
+            max_moves=_MOVES,
         )
         best = min(best, selected, key=lambda s: lack(cover, s))
     return best, tried
