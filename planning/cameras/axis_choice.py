@@ -77,8 +77,9 @@ def no_axes_need_fewer(scene: Scene, stage: CameraStage) -> bool:
     seen = np.zeros_like(cover.measured)
     for camera, view in enumerate(cover.candidates.on(cover.samples.target)):
         seen[view.samples, camera] = True
-    reached = np.any(cover.measured, axis=1)
-    bound = solve_cover(candidate_cover(scene, seen[reached]).problem, seed=scene.seed)
+    seen &= np.any(cover.measured, axis=1)[:, None]
+    problem = candidate_cover(scene, seen, cover.samples).problem
+    bound = solve_cover(problem, seed=scene.seed)
     return bound.lower_bound >= len(stage.cameras)
 
 
@@ -97,8 +98,8 @@ def standing_axes(
     """
     if axis != "free":
         centred = centred_axes(scene, projectors, margin)
-        _, measured = measured_of(scene, centred, views, target)
-        cover = candidate_cover(scene, measured)
+        samples, measured = measured_of(scene, centred, views, target)
+        cover = candidate_cover(scene, measured, samples)
         if axis == "centred" or cover.confirms(np.arange(cover.n_existing)):
             return centred, "centred"
     cameras = views.cameras[: n_fixed(scene)]
