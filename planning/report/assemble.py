@@ -179,7 +179,11 @@ def _certificates(partial: PartialPlan) -> Certificates:
     cameras, routes = partial.camera_stage.certificate, partial.camera_stage.routes
     if routes is not None:
         cameras = cameras.changed(routes=routes)
-    return Certificates(projectors=partial.stage.certificate, cameras=cameras)
+    projectors = partial.stage.certificate
+    if partial.scene.requirements.region_coverage:
+        floors = len(partial.scene.large_regions)
+        projectors, cameras = (p.changed(floors=floors) for p in (projectors, cameras))
+    return Certificates(projectors=projectors, cameras=cameras)
 
 
 def _baselines(

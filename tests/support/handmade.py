@@ -706,6 +706,7 @@ def _claim_tables(
             "status": "feasible",
             "required_m2": share * target[of],
             "n_samples": document["coverage"]["samples"],
+            "floors": 2,
             "candidates": {"lower_bound": 1, "n_candidates": candidates},
             "continuous": None,
             "greedy_count": 3,

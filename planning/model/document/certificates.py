@@ -8,11 +8,17 @@ from .part import Part
 
 
 class CandidateBound(Part):
-    """Least number among the candidate poses."""
+    """Least number among the candidate poses.
+
+    Attributes:
+        for_total: Least number for the required area alone, whatever becomes of single
+            regions; absent: no region has a floor.
+    """
 
     lower_bound: int
     n_candidates: int
     proof: str = ""
+    for_total: int | None = None
 
 
 class ContinuousProof(Part):
@@ -94,6 +100,7 @@ class Certificate(Part):
     Attributes:
         count: Devices of the plan.
         required_m2: Area that must be covered.
+        floors: Regions of each of which `region_coverage` must be covered as well.
         n_samples: Samples that the cover was solved on.
         continuous: Over all poses; None: nothing was proved.
         greedy_count: Candidates that the greedy cover takes.
@@ -121,6 +128,7 @@ class Certificate(Part):
     bounds_leave_out: str = ""
     excluded_pairs: dict[str, int] = Field(default={})
     n_regions: int = 0
+    floors: int = 0
     routes: RouteCounts | None = None
 
 

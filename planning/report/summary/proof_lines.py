@@ -106,7 +106,7 @@ def _proof(plan: RigPlan, kind: str, share: float, verb: str) -> str:
     scope = (
         f"to {verb} {100 * share:g} % of what the {candidates.n_candidates} "
         f"candidate poses{' that mounts can be set to' * stepped} reach of "
-        f"{proof.n_samples} samples{_given(proof)}"
+        f"{proof.n_samples} samples{_floors(plan, proof)}{_given(proof)}"
     )
     name = f"{kind}s"
     if needed.count > count:
@@ -120,6 +120,20 @@ def _proof(plan: RigPlan, kind: str, share: float, verb: str) -> str:
         return f"PROVED   {count_words(count, kind)} {are} the fewest {scope}"
     least = candidates.lower_bound
     return f"BOUND    {count} {name}; at least {least} are needed {scope}"
+
+
+def _floors(plan: RigPlan, proof: Certificate) -> str:
+    """Say that the count is for the floors of regions, too, and what these cost."""
+    if not proof.floors:
+        return ""
+    share = 100 * plan.requirements.region_coverage
+    least, total = proof.needed.lower_bound, proof.candidates.for_total
+    more = (
+        f" (all regions together: at least {total})"
+        if total not in (None, least)
+        else ""
+    )
+    return f" and {share:g} % of each of {count_words(proof.floors, 'region')}{more}"
 
 
 def _given(proof: Certificate) -> str:

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from geometry.arrays import Array, Mask
 from planning.model.document.certificates import Certificate
 from planning.model.document.device_records import CameraRecord, ProjectorRecord
@@ -38,6 +40,7 @@ class DeviceKind:
         proof: Their certificate.
         most: How many are allowed; None: as many as it takes.
         covers: Whether each lights or measures each sample, shape (n_d, n).
+        coverable: Whether anything could, shape (n,).
         reachable_m2: Claimed area of the target that they could cover.
         share: Of it that must be covered.
         poses: Of the reference set, shape (n, 4, 4); `n_poses` are claimed.
@@ -51,6 +54,7 @@ class DeviceKind:
     proof: Certificate
     most: int | None
     covers: Mask
+    coverable: Mask
     reachable_m2: float
     share: float
     poses: Array
@@ -92,6 +96,18 @@ class AuditCase:
         return audit_cameras(self.plan)
 
     @cached_property
+    def large_regions(self) -> set[int]:
+        """Numbers of the regions that a floor is for."""
+        surface, limits = self.plan.surface, self.plan.requirements
+        areas = surface.mesh.face_areas
+        least = limits.region_share * areas[surface.target_faces(limits.target)].sum()
+        return {
+            int(number)
+            for number in np.unique(surface.region[surface.in_dominant])
+            if areas[surface.region == number].sum() >= least * (1.0 - 1e-9)
+        }
+
+    @cached_property
     def kinds(self) -> tuple[DeviceKind, DeviceKind]:
         """What the plan says of its projectors, then of its cameras."""
         limits = self.plan.requirements
@@ -110,6 +126,7 @@ class AuditCase:
             proof=getattr(document.certificates, f"{name}s"),
             most=getattr(limits, f"max_{name}s"),
             covers=covers,
+            coverable=getattr(self.reachable, f"{name}s"),
             reachable_m2=getattr(plan.coverage.target, f"reachable_by_{name}s_m2"),
             share=share,
             poses=getattr(plan.surface, f"reference_{name}s"),

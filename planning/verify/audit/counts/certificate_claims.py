@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from geometry.arrays import Mask
 from planning.model.document.certificates import Certificate
 from planning.verify.audit.audit_case import AuditCase, DeviceKind
 from planning.verify.audit.audit_findings import AuditFindings, square_centimetres
@@ -20,6 +21,7 @@ def audit_certificates(case: AuditCase, findings: AuditFindings) -> None:
         slack = case.estimator.tolerance(chosen, case.estimator.target_m2)
         below = findings.at(f"certificates.{kind.name}s")
         _audit_counts(kind, below)
+        _audit_floors(kind.proof, case, below)
         _audit_continuous(kind.proof, below)
         _audit_areas(kind, slack, case, below)
         _audit_by_count(kind, case, below)
@@ -61,6 +63,21 @@ def _audit_counts(kind: DeviceKind, findings: AuditFindings) -> None:
         needed.lower_bound <= needed.count,
         "needed.lower_bound",
         f"{needed.lower_bound} exceeds the count of {needed.count}",
+    )
+
+
+def _audit_floors(
+    claims: Certificate, case: AuditCase, findings: AuditFindings
+) -> None:
+    """Check of how many regions the count is said to meet the floor."""
+    asked = case.plan.requirements.region_coverage > 0.0
+    truth = len(case.large_regions) if asked else 0
+    findings.number("floors", claims.floors, truth, 0.0, "regions")
+    total, least = claims.candidates.for_total, claims.candidates.lower_bound
+    findings.holds(
+        total is None or 0 <= total <= max(least, claims.needed.lower_bound),
+        "candidates.for_total",
+        f"{total} is claimed without floors, but only {least} with them",
     )
 
 
@@ -111,7 +128,7 @@ def _audit_areas(
         return
     upper, name = fewer.upper_bound_m2, "one_fewer.upper_bound_m2"
     findings.holds(upper >= 0.0, name, f"{upper!r} must be an area")
-    fewest = claims.candidates.lower_bound == claims.count
+    fewest = _for_total(claims) == claims.count
     findings.holds(
         not fewest or upper <= claims.required_m2 + slack,
         name,
@@ -181,15 +198,34 @@ def _audit_bodies(kind: DeviceKind, findings: AuditFindings) -> None:
     )
 
 
+def _for_total(claims: Certificate) -> int:
+    """Return the least number of devices that is claimed for the total alone."""
+    total = claims.candidates.for_total
+    return claims.candidates.lower_bound if total is None else total
+
+
+def _meets_floors(kind: DeviceKind, covered: Mask, case: AuditCase) -> bool:
+    """Whether the samples covered, (n,), meet all floors, more than by chance."""
+    share = case.plan.requirements.region_coverage
+    for number in case.large_regions if share > 0.0 else ():
+        inside = (case.samples.region == number) & kind.coverable
+        n, k = int(inside.sum()), int((inside & covered).sum())
+        if n and k < n * (share + POINT + 3.0 * np.sqrt(0.25 / n)):
+            return False
+    return True
+
+
 def _audit_refuted(
     kind: DeviceKind, slack: float, case: AuditCase, findings: AuditFindings
 ) -> None:
-    """A bound is false if the plan meets the requirement with fewer devices than that.
+    """A bound is false if the plan meets what is required with fewer devices than that.
 
+    The required area and all floors; the bound for the total if it meets the former.
     Devices are left out one after the other, always the one that is missed least;
     existing ones belong to every cover that the bound speaks of.
     """
     bound = kind.proof.candidates.lower_bound
+    total = kind.proof.candidates.for_total or 0
     enough = kind.proof.required_m2 + slack
     covers = kind.covers & case.samples.in_target
     spare = [i for i, device in enumerate(kind.devices) if not device.existing]
@@ -203,13 +239,18 @@ def _audit_refuted(
         ]
         best = int(np.argmax(areas))
         staying.remove(spare.pop(best))
-        if len(staying) < bound and areas[best] > enough:
-            findings.fail(
-                "candidates.lower_bound",
-                f"{bound} is claimed, but {len(staying)} of the plan's devices cover "
-                f"{areas[best]:.6g} m², more than the {enough:.6g} m² required",
-            )
+        if not areas[best] > enough:
             return
+        floors = _meets_floors(kind, np.any(covers[staying], axis=0), case)
+        for name, least in (("for_total", total), ("lower_bound", bound)):
+            if len(staying) < least and (floors or name == "for_total"):
+                findings.fail(
+                    f"candidates.{name}",
+                    f"{least} is claimed, but {len(staying)} of the plan's devices "
+                    f"cover {areas[best]:.6g} m², more than the {enough:.6g} m² "
+                    f"required",
+                )
+                return
 
 
 def audit_routes(proof: Certificate, findings: AuditFindings) -> None:

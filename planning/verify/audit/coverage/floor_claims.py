@@ -50,7 +50,7 @@ def audit_floors(case: AuditCase, findings: AuditFindings) -> None:
 
     Plans from before have none of these, and no floors.
     """
-    plan, large = case.plan, _large_regions(case)
+    plan, large = case.plan, case.large_regions
     share = plan.requirements.region_coverage
     for region in plan.document.regions:
         below = findings.at(f"regions.{region.id}")
@@ -69,17 +69,6 @@ def audit_floors(case: AuditCase, findings: AuditFindings) -> None:
                 case, region, region.coverage, region.id in large, below.at("coverage")
             )
     _audit_worst(case, large, findings)
-
-
-def _large_regions(case: AuditCase) -> set[int]:
-    surface, limits = case.plan.surface, case.plan.requirements
-    areas = surface.mesh.face_areas
-    least = limits.region_share * areas[surface.target_faces(limits.target)].sum()
-    return {
-        int(number)
-        for number in np.unique(surface.region[surface.in_dominant])
-        if areas[surface.region == number].sum() >= least * (1.0 - _SLACK)
-    }
 
 
 def _floor(areas: RegionCoverage, share: float) -> str | None:
