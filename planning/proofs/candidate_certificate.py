@@ -79,16 +79,19 @@ def certified(
         )
         for n, (covered, bound) in sorted(others.n_covered.items())
     )
+    bound = CandidateBound(
+        lower_bound=min(selection.lower_bound, count),
+        n_candidates=n_candidates,
+        proof=selection.proof,
+    )
+    if selection.floors is not None:
+        bound = bound.changed(for_total=min(selection.total_bound, count))
     proof = Certificate(
         count=count,
         status=selection.status,
         required_m2=selection.required * sample_area_m2,
         n_samples=n_samples,
-        candidates=CandidateBound(
-            lower_bound=min(selection.lower_bound, count),
-            n_candidates=n_candidates,
-            proof=selection.proof,
-        ),
+        candidates=bound,
         continuous=None,
         greedy_count=others.greedy,
         needed=NeededCount(count=selection.needed, lower_bound=selection.lower_bound),

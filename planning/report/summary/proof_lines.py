@@ -128,11 +128,8 @@ def _floors(plan: RigPlan, proof: Certificate) -> str:
         return ""
     share = 100 * plan.requirements.region_coverage
     least, total = proof.needed.lower_bound, proof.candidates.for_total
-    more = (
-        f" (all regions together: at least {total})"
-        if total not in (None, least)
-        else ""
-    )
+    without = f" (without these at least {total})"
+    more = without if total not in (None, least) else ""
     return f" and {share:g} % of each of {count_words(proof.floors, 'region')}{more}"
 
 

@@ -180,4 +180,7 @@ def _remedies(
     )
     option_of_count = f"--max-{kind} {needed.count} ({bound})"
     field = () if needed.wider_field is None else (needed.wider_field,)
+    total = proof.candidates.for_total
+    if total is not None and total <= allowed:
+        field += (f"a lower --region-coverage (without floors at least {total})",)
     return ", ".join((option_of_count, *needed.relaxations, *field, f"or {accept}"))

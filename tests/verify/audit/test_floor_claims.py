@@ -7,6 +7,7 @@ import pytest
 from planning.verify.audit.audit import audit_plan
 from planning.verify.audit.audit_case import AuditCase, examine
 from planning.verify.audit.audit_findings import AuditFindings
+from planning.verify.audit.counts.certificate_claims import audit_certificates
 from planning.verify.audit.coverage.floor_claims import audit_floors
 
 
@@ -142,6 +143,66 @@ LIES = {
         "marginal.projectors.1.worst_region: 7 at 0.5 must be a large region",
     ),
 }
+
+
+def _certificate(**values):
+    def change(document):
+        proof = document["certificates"]["projectors"]
+        proof["candidates"] |= {
+            name: values.pop(name)
+            for name in ("lower_bound", "for_total")
+            if name in values
+        }
+        proof.update(values)
+
+    return change
+
+
+def certified(case, plan) -> list[str]:
+    findings = AuditFindings()
+    audit_certificates(replace(case, plan=plan), findings)
+    return list(findings.failures)
+
+
+@pytest.mark.parametrize(
+    ("values", "sentence"),
+    [
+        ({"floors": 1}, "certificates.projectors.floors: claimed 1"),
+        ({"floors": 0}, "certificates.projectors.floors: claimed 0"),
+        ({"for_total": 2}, "for_total: 2 is claimed without floors, but only 1 with"),
+    ],
+)
+def test_a_certificate_speaks_of_every_floor(case, handmade, values, sentence):
+    found = certified(case, handmade.tampered(case.plan, _certificate(**values)))
+    assert any(sentence in failure for failure in found), found
+
+
+@pytest.mark.parametrize(
+    ("floor", "total", "refuted"),
+    [
+        # One projector is enough for a tenth, but leaves a region darker than that.
+        (0.6, None, None),
+        (0.6, 2, "for_total"),
+        (0.0, None, "lower_bound"),
+    ],
+)
+def test_a_floor_may_take_the_device_that_the_total_does_not(
+    case, handmade, floor, total, refuted
+):
+    def change(document):
+        limits, proofs = document["requirements"], document["certificates"]
+        limits |= {"dominant_coverage": 0.1, "region_coverage": floor}
+        reached = document["coverage"]["target"]["reachable_by_projectors_m2"]
+        proof = proofs["projectors"]
+        proof |= {"required_m2": 0.1 * reached, "floors": 2 if floor else 0}
+        proofs["cameras"]["floors"] = 2 if floor else 0
+        proof["candidates"] |= {"lower_bound": 2}
+        proof["candidates"] |= {} if total is None else {"for_total": total}
+        proof["one_fewer"]["upper_bound_m2"] = 0.0
+
+    found = certified(case, handmade.tampered(case.plan, change))
+    key = f"certificates.projectors.candidates.{refuted}: 2 is claimed, but 1"
+    assert [failure.startswith(key) for failure in found] == [True] * bool(refuted)
 
 
 @pytest.mark.parametrize("name", LIES)
