@@ -3,45 +3,34 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
-from planning.cameras.axis_choice import other_axes, place_for_axes, standing_axes
+from planning.cameras.axis_choice import other_axes, place_for_axes
+from planning.cameras.baselines.widest_baselines import WidestBaselines
 from planning.cameras.camera_cover import (
-    CameraCover,
     NothingMeasuredError,
     camera_candidate_views,
-    candidate_cover,
-    measured_of,
 )
-from planning.cameras.camera_routes import widest_route
+from planning.cameras.camera_routes import cheapest, widest_routes
 from planning.cameras.camera_stage import CameraSolution, follow_cameras
 from planning.cameras.proved_cameras import CameraStage, bound_stage
-from planning.model.device_poses import moved_to
+from planning.model.acquisition import pixels_read
 from planning.model.document.certificates import Certificate
 from planning.model.document.device_records import RingAxis
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.plan import RigPlan
-from planning.model.planned import PlannedProjector
 from planning.model.progress import Stopwatch
 from planning.projectors.candidate_set import (
-    CandidateSet,
-    CandidateSource,
     NothingLitError,
 )
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import ProjectorStage, plan_projectors
 from planning.projectors.proved_projectors import prove_fewest
-from planning.proofs.candidate_certificate import larger, unproved
-from planning.proofs.selection import CandidateCover, Selection
+from planning.proofs.candidate_certificate import larger
 from planning.report.advice.camera_relaxations import nothing_measured
 from planning.report.advice.projector_relaxations import nothing_lit
 from planning.report.advice.standing_inside import standing_inside
 from planning.report.advice.what_helps import falls_short
 from planning.report.partial_plan import PartialPlan, Prepared
 from planning.rings.ring_stage import space_rings
-from planning.scene.camera_views import CandidateViews
-from planning.scene.draws import DRAWS
-from planning.scene.placed_bodies import existing_devices
 
 from .proofs import camera_bound, projector_bound
 
@@ -133,51 +122,60 @@ def polished(partial: PartialPlan, clock: Stopwatch) -> PartialPlan:
     """Section VI: the largest baselines that coverage allows; then their rings."""
     with clock.stage("baselines", "baselines: the largest that coverage allows"):
         ranges = partial.request.ranges
-        stage, moved = widest_route(
+        every = widest_routes(
             partial.scene,
             partial.projectors,
             partial.camera_stage,
             spare_field=0.0 if ranges is None else ranges[1].angle_rad,
         )
+    with clock.stage("rings", "rings: axes and radii for the surface and the cameras"):
+        ringed = [_with_rings(partial, stage, moved) for stage, moved in every]
+        costs = [pixels_read(one.final_projectors, one.cameras) for one in ringed]
+        stages = [one.camera_stage for one in ringed]
+        best, stage = cheapest(tuple(zip(stages, costs, strict=True)))
+        partial, moved = replace(ringed[best], camera_stage=stage), every[best][1]
         if moved.smallest_before_m is not None and moved.smallest_after_m is not None:
             clock.say(
                 f"  smallest baseline {1e3 * moved.smallest_before_m:.0f} -> "
                 f"{1e3 * moved.smallest_after_m:.0f} mm"
             )
-    with clock.stage("rings", "rings: axes and radii for the surface and the cameras"):
-        scene, request = partial.scene, partial.request
-        final = CameraSolution(partial.projectors, stage, partial.axes)
-        if partial.axes == "free":
-            final = follow_cameras(
-                scene, partial.projectors, moved.cameras, stage, request.cameras_by
-            )
-        rings = space_rings(
-            scene.among((*final.projectors, *moved.cameras)),
-            final.projectors,
-            moved.cameras,
-            request.rig.rings.spacing,
-            final.stage.cover.samples,
-            margin=request.ring_margin,
-        )
-        partial = replace(
-            partial,
-            projectors=final.projectors,
-            camera_stage=final.stage,
-            cameras=moved.cameras,
-            rings=rings,
-        )
-        if request.ring_axis != "auto":
+        if partial.request.ring_axis != "auto":
             return partial
-        return replace(
-            partial,
-            other_axes=other_axes(
-                scene,
-                final,
-                moved.cameras,
-                partial.ready.template,
-                request.ring_margin,
-            ),
+        others = other_axes(
+            partial.scene,
+            CameraSolution(partial.projectors, stage, partial.axes),
+            moved.cameras,
+            partial.ready.template,
+            partial.request.ring_margin,
         )
+        return replace(partial, other_axes=others)
+
+
+def _with_rings(
+    partial: PartialPlan, stage: CameraStage, moved: WidestBaselines
+) -> PartialPlan:
+    """Cameras as they moved, the ring axes that follow them, and rings for both."""
+    scene, request = partial.scene, partial.request
+    final = CameraSolution(partial.projectors, stage, partial.axes)
+    if partial.axes == "free":
+        final = follow_cameras(
+            scene, partial.projectors, moved.cameras, stage, request.cameras_by
+        )
+    rings = space_rings(
+        scene.among((*final.projectors, *moved.cameras)),
+        final.projectors,
+        moved.cameras,
+        request.rig.rings.spacing,
+        final.stage.cover.samples,
+        margin=request.ring_margin,
+    )
+    return replace(
+        partial,
+        projectors=final.projectors,
+        camera_stage=final.stage,
+        cameras=moved.cameras,
+        rings=rings,
+    )
 
 
 def bounded_cameras(partial: PartialPlan, clock: Stopwatch) -> PartialPlan:
@@ -241,80 +239,3 @@ def one_device_more(
 def _bound_words(proof: Certificate) -> str:
     bound = proof.continuous
     return "" if bound is None else f"at least {bound.lower_bound}, {bound.proof}"
-
-
-def as_they_stand(ready: Prepared, clock: Stopwatch) -> PartialPlan:
-    """Return the existing devices with their rings, and what candidates would reach."""
-    request, scene = ready.request, ready.scene
-    with clock.stage("projectors", "projectors: what they light as they stand"):
-        offered, views = _offered(ready)
-        samples = scene.target_samples(DRAWS.projectors)
-        candidates = CandidateSet.over(scene, samples, offered)
-        projectors = candidates.projectors[: candidates.n_existing]
-        proof = unproved(candidates.cover, candidates.samples.samples.weight)
-        stage = ProjectorStage(
-            {len(projectors): projectors}, proof, projectors, candidates
-        )
-    with clock.stage("cameras", "cameras: what they measure as they stand"):
-        cameras = views.cameras[: len(scene.requirements.existing_of("camera"))]
-        target = scene.target_samples(DRAWS.cameras)
-        asked, margin = request.ring_axis, request.ring_margin
-        projectors, axes = standing_axes(
-            scene, projectors, views, target, axis=asked, margin=margin
-        )
-        samples, measured = measured_of(scene, projectors, views, target)
-        cover = candidate_cover(scene, measured, samples)
-        proof = unproved(cover, target.samples.weight)
-        camera_stage = CameraStage(
-            {len(cameras): cameras},
-            proof,
-            cameras,
-            CameraCover(views, samples, measured, _standing(cover)),
-        )
-    with clock.stage("rings", "rings: radii for the surface and the cameras"):
-        spacing = request.rig.rings.spacing
-        rings = space_rings(scene, projectors, cameras, spacing, samples, margin=margin)
-    return PartialPlan(
-        ready, stage, projectors, camera_stage, cameras, axes=axes, rings=rings
-    )
-
-
-def _offered(ready: Prepared) -> tuple[tuple[PlannedProjector, ...], CandidateViews]:
-    """Existing devices and poses that define what is reachable: a plan's own, or new.
-
-    A plan's devices reach what they reached there.
-    """
-    scene, rig, mounted = ready.scene, ready.request.rig, ready.request.mounted
-    required = scene.requirements
-    known = None if mounted is None else mounted.reference(required.workspace)
-    if known is None:
-        source = CandidateSource(scene, ready.template)
-        views = camera_candidate_views(scene, ready.camera, rig.n_camera_poses)
-        return source.lattice(rig.n_projector_poses), views
-    frames = zip(known.reference_projectors, known.reference_rings, strict=True)
-    projectors = (
-        replace(ready.template, world_from_device=pose, world_from_ring=ring)
-        for pose, ring in frames
-    )
-    cameras = (moved_to(ready.camera, pose) for pose in known.reference_cameras)
-    return (
-        (*existing_devices(required, ready.template), *projectors),
-        CandidateViews(scene, (*existing_devices(required, ready.camera), *cameras)),
-    )
-
-
-def _standing(cover: CandidateCover) -> Selection:
-    """The existing devices as a selection that nothing was proved of."""
-    chosen = np.arange(cover.n_existing)
-    n_covered = cover.n_covered(chosen)
-    met = cover.enough(chosen)
-    return Selection(
-        chosen,
-        chosen,
-        0,
-        "feasible" if met else "infeasible",
-        "",
-        cover.required,
-        n_covered,
-        n_covered,
-    )

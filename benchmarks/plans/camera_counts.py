@@ -33,7 +33,7 @@ from geometry.curvature.refinement import cut_for_curvature
 from geometry.mesh.mesh import TriangleMesh
 from planning import load_mesh, load_rig, verify_plan
 from planning.cameras.camera_cover import camera_candidate_views
-from planning.cameras.camera_routes import widest_route
+from planning.cameras.camera_routes import widest_routes
 from planning.cameras.camera_stage import CameraSolution, place_cameras
 from planning.model.document.certificates import CamerasBy
 from planning.model.planned import PlannedCamera, PlannedProjector
@@ -173,7 +173,7 @@ def _by_default(job: Job) -> Found:
     """The better route, as far as the slides."""
     scene, solution = job.ready.scene, job.place("both")
     before = solution.stage
-    after, slid = widest_route(scene, solution.projectors, before)
+    after, slid = widest_routes(scene, solution.projectors, before)[0]
     routes, proof = after.routes, after.certificate
     assert routes is not None
     rows = lit_samples(
@@ -207,7 +207,7 @@ def _by_default(job: Job) -> Found:
 def _smallest(scene: Scene, solution: CameraSolution) -> float | None:
     """Smallest baseline of the cover's cameras before they slide."""
     stage = replace(solution.stage, routes=None)
-    return widest_route(scene, solution.projectors, stage)[1].smallest_before_m
+    return widest_routes(scene, solution.projectors, stage)[0][1].smallest_before_m
 
 
 def _by_paper(job: Job, *, check: bool) -> tuple[str, ...]:

@@ -3,8 +3,8 @@
 Both get the same projectors and ring axes. Where the paper's route, or poses at the
 limit (10) of the cover's own cameras, need fewer, they join the candidates and the
 cover is solved again, so that what is proved is proved over a set that holds them.
-Where both need as many, the cover's cameras stay, unless the baselines of the paper's
-are clearly larger and they measure no less.
+Where both need as many and the paper's measure no less, those stay whose scan is
+cheaper by eq. (8); else the cover's, unless the paper's baselines are clearly larger.
 """
 
 from collections.abc import Sequence
@@ -44,6 +44,7 @@ from .camera_cover import CameraCover, candidate_cover, n_fixed, plan_cameras
 from .proved_cameras import CameraStage
 
 _Projectors = tuple[PlannedProjector, ...]
+Widened = tuple[CameraStage, WidestBaselines]
 
 # A smallest baseline counts as clearly larger from this ratio on.
 _CLEARLY = 1.1
@@ -123,14 +124,17 @@ def _counts(by: CamerasBy, cover: CameraCover, why: str) -> RouteCounts:
     return RouteCounts(asked=by, cover=None, paper=count, taken="paper", why=why)
 
 
-def widest_route(
+def widest_routes(
     scene: Scene,
     projectors: Sequence[PlannedProjector],
     stage: CameraStage,
     *,
     spare_field: float = 0.0,
-) -> tuple[CameraStage, WidestBaselines]:
-    """Maximise baselines, or take the paper's cameras where theirs are clearly larger.
+) -> tuple[Widened, ...]:
+    """Return the cameras with maximised baselines, the better of two routes first.
+
+    The paper's as many cameras are the other, unless something is lost by them; where
+    they stand clearly farther apart they are the better.
 
     `spare_field` [rad] of the half fields is kept free beyond seams. The paper's
     cameras moved without, so they aren't taken where there is any.
@@ -146,13 +150,32 @@ def widest_route(
     )
     routes = stage.routes
     if spare_field or routes is None or len(stage.rival) != len(stage.cameras):
-        return stage, widest
+        return ((stage, widest),)
     rival = widen_baselines(samples, stage.rival, max_evaluations=1, max_programs=0)
-    if not _clearly_wider(rival, widest):
-        return stage, widest
+    if _loses(rival, widest):
+        return ((stage, widest),)
     why = f"as many, {_apart(rival)} instead of {_apart(widest)} apart at the least"
     routes = routes.changed(taken="paper", why=why)
-    return replace(stage, cameras=rival.cameras, routes=routes), rival
+    other = replace(stage, cameras=rival.cameras, routes=routes), rival
+    if _clearly_wider(rival, widest):
+        return other, (stage, widest)
+    return (stage, widest), other
+
+
+def cheapest(
+    solutions: Sequence[tuple[CameraStage, int]],
+) -> tuple[int, CameraStage]:
+    """Return which of as many cameras costs least, the first of equals, and why.
+
+    Each comes with its pixels times frames.
+    """
+    costs = [cost for _, cost in solutions]
+    best = costs.index(min(costs))
+    stage = solutions[best][0]
+    if best == 0 or stage.routes is None:
+        return best, stage
+    why = f"as many, and {1.0 - costs[best] / costs[0]:.1%} fewer pixels to read"
+    return best, replace(stage, routes=stage.routes.changed(why=why))
 
 
 def _apart(baselines: WidestBaselines) -> str:
@@ -160,13 +183,15 @@ def _apart(baselines: WidestBaselines) -> str:
 
 
 def _clearly_wider(rival: WidestBaselines, widest: WidestBaselines) -> bool:
-    """Whether baselines are larger and nothing is lost: neither area nor overlap."""
     theirs, ours = rival.smallest_after_m, widest.smallest_after_m
-    if theirs is None or ours is None or not theirs >= _CLEARLY * ours:
-        return False
+    return theirs is not None and ours is not None and theirs >= _CLEARLY * ours
+
+
+def _loses(rival: WidestBaselines, widest: WidestBaselines) -> bool:
+    """Whether a rival measures less, or its parts overlap less."""
     counts = [int(s.measured_by.any(axis=1).sum()) for s in (rival, widest)]
     groups = [len(overlap_components(s.measured_by)) for s in (rival, widest)]
-    return counts[0] >= counts[1] and groups[0] <= groups[1]
+    return counts[0] < counts[1] or groups[0] > groups[1]
 
 
 def _with_more(

@@ -21,9 +21,11 @@ from planning.cameras.camera_baselines import baseline_samples, held_to_candidat
 from planning.cameras.camera_cover import camera_candidate_views
 from planning.cameras.camera_routes import (
     _clearly_wider,
+    _loses,
     better_route,
+    cheapest,
     cover_by_cover,
-    widest_route,
+    widest_routes,
 )
 from planning.cameras.paper.paper_cameras import cover_by_paper, route_among
 from planning.cameras.proved_cameras import camera_stage
@@ -191,7 +193,8 @@ def test_the_papers_cameras_are_taken_where_they_stand_clearly_farther_apart(
     fixed = tuple(replace(c, existing="old") for c in _beside(stage.cameras))
     close = replace(stage, cameras=fixed)
     rivals = replace(close, routes=routes, rival=stage.cameras)
-    taken, slid = widest_route(scene, projectors, rivals)
+    (taken, slid), (other, _) = widest_routes(scene, projectors, rivals)
+    assert other is rivals
     assert taken.routes.taken == "paper"
     assert "instead of" in taken.routes.why
     assert slid.cameras is taken.cameras
@@ -200,7 +203,13 @@ def test_the_papers_cameras_are_taken_where_they_stand_clearly_farther_apart(
     ]
     # Other numbers than the cover's are no rivals.
     fewer = replace(rivals, rival=stage.cameras[:2])
-    assert widest_route(scene, projectors, fewer)[0] is fewer
+    ((alone, _),) = widest_routes(scene, projectors, fewer)
+    assert alone is fewer
+    # As many, and the second has fewer frames; of equals the first stays.
+    assert cheapest([(taken, 660), (rivals, 660)]) == (0, taken)
+    best, cheaper = cheapest([(taken, 660), (rivals, 600)])
+    assert (best, cheaper.cameras) == (1, rivals.cameras)
+    assert cheaper.routes.why == "as many, and 9.1% fewer pixels to read"
 
 
 def test_cameras_slide_no_farther_than_candidates_reach(ball, monkeypatch):
@@ -217,7 +226,7 @@ def test_cameras_slide_no_farther_than_candidates_reach(ball, monkeypatch):
     held = held_to_candidates(samples, stage.reference, cover.samples, cover.measured)
     covered = held.covered
     assert covered.mean() < 0.95 * samples.lit.lit.any(axis=1).mean()
-    _, slid = widest_route(scene, projectors, stage)
+    ((_, slid),) = widest_routes(scene, projectors, stage)
     beyond = slid.measured_by.any(axis=1) & ~covered
     assert beyond.sum() <= 0.002 * covered.sum()
     assert any(
@@ -255,7 +264,9 @@ def _slid(apart_m, parts):
 def test_clearly_farther_apart_is_a_tenth_and_loses_neither_area_nor_overlap(
     rival, better
 ):
-    assert _clearly_wider(rival, _slid(1.0, (range(6), range(5, 10)))) == better
+    widest = _slid(1.0, (range(6), range(5, 10)))
+    taken = _clearly_wider(rival, widest) and not _loses(rival, widest)
+    assert taken == better
 
 
 @pytest.fixture(scope="module")

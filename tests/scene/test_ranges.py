@@ -9,7 +9,7 @@ import pytest
 
 from geometry.shapes.best_sphere import BestSphere, fit_sphere
 from geometry.shapes.sight_lines import SightLines, locate
-from planning.cameras.camera_routes import widest_route
+from planning.cameras.camera_routes import widest_routes
 from planning.model.errors import InfeasibleLimitsError, InputError
 from planning.model.plan import RigPlan
 from planning.pipeline import plan_rig
@@ -396,10 +396,10 @@ def plan(body, with_few_samples, tmp_path_factory):
 
     def noted(*words, spare_field):
         spared.append(spare_field)
-        return widest_route(*words, spare_field=spare_field)
+        return widest_routes(*words, spare_field=spare_field)
 
     with with_few_samples(), pytest.MonkeyPatch.context() as patch:
-        patch.setattr("planning.stages.widest_route", noted)
+        patch.setattr("planning.stages.widest_routes", noted)
         made = plan_rig(body, load_rig(rig), max_projectors=8, check=False)
     assert set(spared) == {made.to_document()["ranges"]["guard_rad"]}
     return made
