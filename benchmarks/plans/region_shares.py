@@ -18,7 +18,8 @@ of the lowest F. Below it rank correlations (Spearman) with the projectors.
 import argparse
 import sys
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from scipy.stats import spearmanr
@@ -44,40 +45,37 @@ from solvers import CoverProblem, solve_cover
 _DIRECTIONS = 640
 
 
-@dataclass(frozen=True, eq=False)
-class _Row:
-    """One mesh: what was prepared of it, and its plans by floor with their seconds."""
-
-    name: str
-    ready: Prepared
-    plans: dict[float, tuple[RigPlan, float]]
-
-
 def main() -> int:
-    """Print both tables."""
+    """Print both tables; rows of the second on standard error as they come."""
     given = _arguments()
-    rows: list[_Row] = []
+    rows: list[tuple[str, tuple[int, ...]]] = []
     print(
         "| mesh | F | projectors | cameras | regions below F | least lit | "
         "least measured | CPU [s] |\n|---|---|---|---|---|---|---|---|",
         flush=True,
     )
-    for path, options, up in jobs(given.names):
+    least = min(given.floors)
+    for path, options, up in sorted(jobs(given.names), key=_size):
         mesh, _ = cut_for_curvature(load_mesh(path, **options))  # pyright: ignore[reportArgumentType]
-        plans: dict[float, tuple[RigPlan, float]] = {}
         for floor in given.floors:
-            ready = _ready(mesh, up, floor)
             begin = time.process_time()
             try:
-                plans[floor] = _planned(ready), time.process_time() - begin
+                ready = _ready(mesh, up, floor)
+                plan = _planned(ready)
             except InfeasibleLimitsError as error:
                 print(f"| {path.name} | {floor:g} | none: {error} |", flush=True)
                 continue
-            print(_line(path.name, floor, *plans[floor]), flush=True)
-        if plans:
-            rows.append(_Row(path.name, ready, plans))
+            seconds = time.process_time() - begin
+            print(_line(path.name, floor, plan, seconds), flush=True)
+            if floor == least:
+                rows.append(_causes(path.name, ready, plan))
+                print(rows[-1], file=sys.stderr, flush=True)
     _print_causes(rows)
     return 0
+
+
+def _size(job: tuple[Path, dict[str, object], str | None]) -> int:
+    return job[0].stat().st_size
 
 
 def _arguments() -> argparse.Namespace:
@@ -138,30 +136,27 @@ def _line(name: str, floor: float, plan: RigPlan, seconds: float) -> str:
     )
 
 
-def _print_causes(rows: list[_Row]) -> None:
+def _causes(name: str, ready: Prepared, plan: RigPlan) -> tuple[str, tuple[int, ...]]:
+    """A line of the second table, and its numbers."""
+    cones = np.degrees([r.cone_angle for r in plan.document.regions])
+    n, large, count = len(cones), len(_large(plan)), len(plan.projectors)
+    normals, shadows = _directions(ready, plan)
+    line = (
+        f"| {name} | {n} ({large}) | {np.median(cones):.0f}°, {cones.max():.0f}° | "
+        f"{normals} | {shadows} | {count} | {count / n:.2f} |"
+    )
+    return line, (n, large, normals, shadows, count)
+
+
+def _print_causes(rows: list[tuple[str, tuple[int, ...]]]) -> None:
     print(
         "\n| mesh | regions (large) | cones, median and widest | by normals | "
         "and shadows | projectors | P/regions |\n|---|---|---|---|---|---|---|"
     )
-    columns: list[tuple[int, ...]] = []
-    for row in rows:
-        plan, _ = row.plans[min(row.plans)]
-        cones = np.degrees([r.cone_angle for r in plan.document.regions])
-        n, large = len(cones), len(_large(plan))
-        normals, shadows = _directions(row.ready, plan)
-        count = len(plan.projectors)
-        columns.append((n, large, normals, shadows, count))
-        print(
-            f"| {row.name} | {n} ({large}) | {np.median(cones):.0f}°, "
-            f"{cones.max():.0f}° | {normals} | {shadows} | {count} | {count / n:.2f} |"
-        )
-    if len(columns) < 3:
-        return
-    table = np.array(columns)
-    print()
-    for k, name in enumerate(
-        ("regions", "large regions", "directions by normals", "by normals and shadows")
-    ):
+    print("\n".join(line for line, _ in rows), "\n")
+    table = np.array([numbers for _, numbers in rows])
+    names = "regions", "large regions", "directions by normals", "and shadows"
+    for k, name in enumerate(names if len(rows) > 2 else ()):
         rank, p = spearmanr(table[:, k], table[:, -1])
         print(
             f"* {name} and projectors: rank correlation {rank:.2f} (p = {p:.2g}, "
