@@ -30,6 +30,7 @@ from planning.report.advice.projector_relaxations import nothing_lit
 from planning.report.advice.standing_inside import standing_inside
 from planning.report.advice.what_helps import falls_short
 from planning.report.partial_plan import PartialPlan, Prepared
+from planning.report.region_claims import below_floor
 from planning.rings.ring_stage import space_rings
 
 from .proofs import camera_bound, projector_bound
@@ -218,7 +219,12 @@ def one_device_more(
     The proved bound stays what it is; the count is then above it, and says so.
     """
     required, areas = plan.requirements, plan.coverage.target
-    if falls_short(
+    floors = [
+        below_floor(region.coverage, required.region_coverage)
+        for region in plan.document.regions
+        if region.coverage is not None and region.coverage.floor == "missed"
+    ]
+    if any(unlit for unlit, _ in floors) or falls_short(
         areas.lit_m2, areas.reachable_by_projectors_m2, required.dominant_coverage
     ):
         stage = larger(partial.stage, partial.stage.projectors, required.max_projectors)
@@ -226,7 +232,9 @@ def one_device_more(
             clock.say("  fresh samples fall short: one projector more")
             stage = replace(stage, projectors=stage.by_count[stage.certificate.count])
             return placed(partial.ready, stage, clock)
-    if falls_short(areas.measured_m2, areas.reachable_by_cameras_m2, required.coverage):
+    if any(unmeasured for _, unmeasured in floors) or falls_short(
+        areas.measured_m2, areas.reachable_by_cameras_m2, required.coverage
+    ):
         views = larger(partial.camera_stage, partial.cameras, required.max_cameras)
         if views is not None:
             clock.say("  fresh samples fall short: one camera more")

@@ -106,8 +106,8 @@ def claim_regions(devices: Devices, samples: RegionSamples) -> tuple[RegionClaim
     for index in range(int(scene.region.max()) + 1):
         areas = _areas(samples, index, [camera.id for camera in devices.cameras])
         if floor and index in large:
-            met = meets_floor(areas, floor)
-            areas = areas.changed(floor="met" if met else "missed")
+            missed = any(below_floor(areas, floor))
+            areas = areas.changed(floor="missed" if missed else "met")
         inside = samples.region == index
         by = np.unique(samples.primary[inside])
         names = tuple(devices.projectors[p].id for p in by if p >= 0)
@@ -150,15 +150,11 @@ def _areas(
     )
 
 
-def meets_floor(areas: RegionCoverage, share: float) -> bool:
-    """Return whether a share of what can be lit is, and of what can be measured."""
-    return all(
-        part >= share * whole * (1.0 - _SLACK)
-        for part, whole in (
-            (areas.lit_m2, areas.reachable_by_projectors_m2),
-            (areas.measured_m2, areas.reachable_by_cameras_m2),
-        )
-    )
+def below_floor(areas: RegionCoverage, share: float) -> tuple[bool, bool]:
+    """Return whether less than a share of what can be lit is, and of the measurable."""
+    lit = share * areas.reachable_by_projectors_m2 * (1.0 - _SLACK)
+    measured = share * areas.reachable_by_cameras_m2 * (1.0 - _SLACK)
+    return areas.lit_m2 < lit, areas.measured_m2 < measured
 
 
 def _lacking(scene: Scene, target: Target) -> Target | None:

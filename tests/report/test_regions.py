@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,9 +20,11 @@ from support.factories import (
 from geometry.poses import look_at
 from geometry.rays.rays import RayCaster
 from geometry.shapes.primitives import sphere
+from planning import stages
 from planning.cli.main import commands
 from planning.model.document.coverage_records import RegionRecord
 from planning.model.plan import RigPlan
+from planning.model.progress import Stopwatch
 from planning.report.advice.floor_relaxations import with_floor_relaxations
 from planning.report.claims import make_claims
 from planning.report.drawing.panel import Panel
@@ -232,3 +235,34 @@ def test_numbers_stand_on_their_regions_where_a_view_shows_them(plan):
     spot = view.project(spots[0][0])
     assert left <= spot[0] <= right
     assert top <= spot[1] <= bottom
+
+
+@pytest.mark.parametrize(
+    ("lit", "measured", "asked"),
+    [(0.6, 1.0, "projector"), (1.0, 0.6, "camera"), (1.0, 1.0, None)],
+)
+def test_a_floor_that_fresh_samples_miss_asks_for_one_device_more(
+    handmade, monkeypatch, lit, measured, asked
+):
+    def change(document):
+        limits = document["requirements"]
+        limits |= {"region_coverage": 0.7, "coverage": 0.1, "dominant_coverage": 0.1}
+        areas = document["regions"][1]["coverage"]
+        areas |= {"lit_m2": 0.006 * lit, "reachable_by_projectors_m2": 0.006}
+        areas |= {"measured_m2": 0.003 * measured, "reachable_by_cameras_m2": 0.003}
+        areas["floor"] = "met" if asked is None else "missed"
+
+    plan = handmade.tampered(handmade.build_plan(), change)
+    wanted: list[str] = []
+
+    def larger(stage, *_):
+        wanted.append(stage.kind)
+
+    monkeypatch.setattr(stages, "larger", larger)
+    partial = SimpleNamespace(
+        stage=SimpleNamespace(kind="projector", projectors=()),
+        camera_stage=SimpleNamespace(kind="camera"),
+        cameras=(),
+    )
+    assert stages.one_device_more(partial, plan, Stopwatch()) is None
+    assert wanted == ([] if asked is None else [asked])
