@@ -163,10 +163,13 @@ def plan_rig(
 
 
 def _axes_may_help(plan: RigPlan, partial: PartialPlan) -> bool:
-    """Whether centred ring axes weren't asked for, and the check isn't passed."""
-    check = plan.document.reconstruction
-    left = partial.axes == "centred" and partial.request.ring_axis == "auto"
-    return left and check is not None and not check.passed
+    """Whether only the check isn't passed, and centred ring axes weren't asked for."""
+    if partial.axes == "free" or partial.request.ring_axis != "auto":
+        return False
+    check, alone = plan.document.reconstruction, {"reconstruction": None}
+    if check is None or check.passed:
+        return False
+    return not shortfalls(RigPlan(plan.document.changed(**alone), plan.surface))
 
 
 def missed_by(plan: RigPlan, *, check: bool) -> tuple[str, ...]:

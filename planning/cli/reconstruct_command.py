@@ -6,6 +6,7 @@ is smaller than asked, 2 unwritable, 3 a bad plan, calibration or folder of capt
 
 from collections.abc import Mapping
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +36,12 @@ from planning.verify.reconstruction.cloud_file import (
     remove_cloud,
 )
 from planning.verify.reconstruction.pattern_files import check_patterns
+from planning.verify.reconstruction.reconstruct import (
+    BothSequences,
+    reconstruct_twice,
+)
 from planning.verify.reconstruction.render.countdown import countdown
+from planning.verify.reconstruction.render.photometry import assumed_light
 from planning.verify.reconstruction.scanner import Scanner
 from planning.verify.reconstruction.single_shot.single_shot import (
     reconstruct_single_shot,
@@ -66,7 +72,7 @@ def reconstruct_command(options: Mapping[str, Any]) -> int:
             if place is not None:
                 folders.enter_context(writable(place))
         try:
-            result = _reconstruct(plan, scanner, options, report)
+            result, twice = _reconstruct(plan, scanner, options, report)
         except CapturesError:
             for name in (CLOUD, DEVIATION):
                 remove_cloud(folder / name)
@@ -84,9 +90,10 @@ def reconstruct_command(options: Mapping[str, Any]) -> int:
             written[DEVIATION].save(folder / DEVIATION)
     files = {folder / name: file for name, file in written.items()}
     if options["as_json"]:
-        print_json(_document(result, deviation, files))
+        print_json(_document(result, deviation, files) | _sequences(twice))
     else:
-        click.echo(_summary(plan, result, deviation, files))
+        lines = [] if twice is None else _sequence_lines(plan, twice)
+        click.echo("\n".join([*lines, _summary(plan, result, deviation, files)]))
     return 0 if result.passed else 1
 
 
@@ -106,7 +113,8 @@ def _reconstruct(
     scanner: Scanner,
     options: Mapping[str, Any],
     report: Report,
-) -> Reconstruction:
+) -> tuple[Reconstruction, BothSequences | None]:
+    """Return what was measured, and both sequences if a second one was wanted."""
     seed = options["seed"]
     seed = plan.document.seed if seed is None else seed
     threads = options["threads"] or n_threads()
@@ -116,30 +124,69 @@ def _reconstruct(
     predicted = predict_measured(plan, seed=seed, threads=threads)
     expected = Expected(bare(predicted.samples), predicted.measured, predicted.by_pair)
     progress = countdown(report, n_cameras=len(scanner.cameras), threads=threads)
+    light = assumed_light(scanner)
+    if options["ambient"] is not None:
+        light = replace(light, ambient=options["ambient"])
     if options["single_shot"]:
-        return reconstruct_single_shot(
+        result = reconstruct_single_shot(
             scanner,
             expected,
             tolerance_m=1e-3 * (options["prior_mm"] or _PRIOR_MM),
             seed=seed,
+            photometry=light,
             progress=progress,
         )
+        return result, None
     if options["captures"] is not None:
         folder = CaptureFolder(options["captures"], scanner)
-        return reconstruct_captured(
+        result = reconstruct_captured(
             folder, expected, believed=mounted, threads=threads, progress=progress
         )
+        return result, None
+    if options["second_sequence"]:
+        twice = reconstruct_twice(
+            scanner,
+            expected=expected,
+            seed=seed,
+            threads=threads,
+            mounted=mounted,
+            photometry=light,
+            progress=progress,
+        )
+        return twice.both, twice
     place = options["save_captures"]
-    return reconstruct_rendered(
+    result = reconstruct_rendered(
         scanner,
         expected,
         seed=seed,
         threads=threads,
         truth=mounted,
         believed=mounted,
+        photometry=light,
         save=None if place is None else CaptureFolder(place, scanner),
         progress=progress,
     )
+    return result, None
+
+
+def _sequences(twice: BothSequences | None) -> dict[str, Any]:
+    """Where a second sequence's rings lay, and what the first gave alone."""
+    if twice is None:
+        return {}
+    rings = {one.id: one.pattern.radii.tolist() for one in twice.second.projectors}
+    return {"first_sequence": twice.first.to_document(), "second_ring_radii": rings}
+
+
+def _sequence_lines(plan: RigPlan, twice: BothSequences) -> list[str]:
+    rings = ", ".join(
+        f"{one.id} {len(one.pattern.radii)}" for one in twice.second.projectors
+    )
+    return [
+        "the first sequence alone:",
+        *_figures(plan, twice.first),
+        f"with a second sequence of as many rings ({rings}), placed where the first "
+        f"leaves most error:",
+    ]
 
 
 def save_cloud(

@@ -1,13 +1,17 @@
 """Runs an experiment: one viewpoint, several, merged, and held to the truth."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from geometry.mesh.sampling import SurfaceSamples, sample_surface
-from planning.verify.reconstruction.arrays import Array
 from planning.verify.reconstruction.check.result import Reconstruction
 from planning.verify.reconstruction.cloud import Cloud
+from planning.verify.reconstruction.patterns.second_sequence import (
+    both_sequences,
+    numbered,
+    second_sequence,
+)
 from planning.verify.reconstruction.reconstruct import conclude, reconstruct
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.rendered import Progress
@@ -134,22 +138,12 @@ def run_experiment(
     )
 
 
-def midway(radii: Array) -> Array:
-    """Return radii midway between the rings, the first between centre and ring."""
-    return 0.5 * (np.concatenate([[0.0], radii[:-1]]) + radii)
-
-
-def second_sequence(scanner: Scanner) -> Scanner:
-    """Return a rig whose projectors draw their rings midway between its own."""
-    shifted = [
-        replace(one, pattern=replace(one.pattern, radii=midway(one.pattern.radii)))
-        for one in scanner.projectors
-    ]
-    return replace(scanner, projectors=tuple(shifted))
-
-
 def double_density(
-    outcome: Outcome, *, seed: int = 0, threads: int = 2
+    outcome: Outcome,
+    second: Scanner | None = None,
+    *,
+    seed: int = 0,
+    threads: int = 2,
 ) -> MeasuredErrors:
     """Measure an experiment's object again, with rings between those of before.
 
@@ -157,24 +151,16 @@ def double_density(
     previous light sources". Finer rings in one sequence would come too near each other
     in the images; a second sequence doubles the density and keeps their distance.
     Returns all points of both; rings are numbered outwards through both sequences. The
-    seed is the first sequence's; the second's noise is another.
+    seed is the first sequence's; the second's noise is another. Without `second`, the
+    rig with the rings to measure with, these follow from the first points.
     """
-    experiment = outcome.experiment
-    second = reconstruct(
-        second_sequence(experiment.scanner),
-        seed=seed + 1,
-        threads=threads,
-        photometry=outcome.photometry,
+    experiment, first = outcome.experiment, outcome.union.cloud
+    rig = second or second_sequence(experiment.scanner, first)
+    again = reconstruct(
+        rig, seed=seed + 1, threads=threads, photometry=outcome.photometry
     )
-    first = outcome.union.cloud
-    cloud = Cloud.join(
-        [
-            replace(first, ring=(2 * first.ring + 1).astype(np.int16)),
-            replace(
-                second.everything, ring=(2 * second.everything.ring).astype(np.int16)
-            ),
-        ]
-    )
+    _, (before, after) = both_sequences(experiment.scanner, rig)
+    cloud = Cloud.join([numbered(first, before), numbered(again.everything, after)])
     return measured(
         "both sequences", cloud, experiment.mesh, outcome.samples, experiment.gap_m
     )

@@ -82,6 +82,7 @@ class CheckLimits:
             within tau.
         max_predicted_missing: Largest share of the samples predicted measured that
             have no point within tau.
+        ambient: Room light, as a share of the projector's at normal incidence.
     """
 
     max_rms_m: float
@@ -90,6 +91,7 @@ class CheckLimits:
     tau_m: float
     min_completeness: float
     max_predicted_missing: float
+    ambient: float = 0.05
 
 
 @dataclass(frozen=True)

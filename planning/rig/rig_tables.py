@@ -223,6 +223,7 @@ class CheckTable(Table):
     max_bias_mm: Positive = 0.03
     min_completeness: Share = 0.90
     max_predicted_missing: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.01
+    ambient: Annotated[float, Field(ge=0.0, le=10.0)] = 0.05
 
 
 class RigTable(Table):

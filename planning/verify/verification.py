@@ -131,7 +131,7 @@ def verify_plan(
         if differs and _comparable(mesh, plan.surface.mesh):
             other = mesh
     recorded = plan.document.reconstruction
-    failures += contradictions(recorded)
+    failures += contradictions(recorded, plan.requirements.check)
     if not check_pixels:
         return Verification(tuple(failures), audit, None)
     pixels = _reconstruct(plan, audit, truth, other, seed, threads, say)

@@ -51,6 +51,24 @@ def simulated(folder):
     return run(folder / "plan.json", *words, "--quiet")
 
 
+def test_a_second_sequence_in_other_room_light(folder, simulated):
+    words = ["--second-sequence", "--ambient", "0.3", "-o", folder / "two", "--json"]
+    code, out, _ = run(folder / "plan.json", *words, "--quiet")
+    both = json.loads(out)
+    first, radii = both["first_sequence"], both["second_ring_radii"]["P1"]
+    assert (both["ambient"], first["ambient"], code) == (0.3, 0.3, 0)
+    assert 1.7 * first["n_points"] < both["n_points"] < 2.3 * first["n_points"]
+    own = RigPlan.load(folder / "plan.json").projectors[0].ring_radii
+    assert len(own) - 3 <= len(radii) <= len(own)
+    assert not np.intersect1d(np.round(own, 9), np.round(radii, 9)).size
+    shares = [next(c["fraction"] for c in one["completeness"]) for one in (first, both)]
+    assert shares[1] >= shares[0]
+    code, out, _ = run(
+        folder / "plan.json", *words[:3], "-o", folder / "two", "--quiet"
+    )
+    assert "with a second sequence of as many rings (P1" in out
+
+
 def header_of(path: Path) -> list[str]:
     return path.read_bytes().split(b"end_header\n")[0].decode().splitlines()
 

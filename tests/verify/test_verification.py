@@ -159,6 +159,10 @@ def test_a_pass_with_failures_contradicts_itself_without_the_pixels(handmade, ve
     found = verify_plan(plan, check_pixels=False)
     assert len(found.failures) == 1
     assert found.failures[0].startswith("reconstruction.passed: claimed True, but")
+    recorded |= {"failures": [], "ambient": 0.2}
+    plan = handmade.tampered(plan, lambda d: d.update(reconstruction=recorded))
+    (told,) = verify_plan(plan, check_pixels=False).failures
+    assert told.startswith("reconstruction.ambient: claimed 0.2")
 
 
 @pytest.mark.parametrize(

@@ -43,7 +43,8 @@ from planning.cli.console import (
     "--ambient",
     type=Finite(0.0, 10.0),
     metavar="A",
-    help="Of the experiment: room light as a share of the projector's [default: 0].",
+    help="Room light as a share of the projector's [default: what the plan's check "
+    "assumes; of an experiment 0].",
 )
 @click.option(
     "--distortion",
@@ -54,7 +55,7 @@ from planning.cli.console import (
 @click.option(
     "--second-sequence",
     is_flag=True,
-    help="Of the experiment: measure again with rings midway between the first ones.",
+    help="Measure again, with as many rings where the first ones leave most error.",
 )
 @click.option(
     "--single-shot",
@@ -148,7 +149,7 @@ def _check_reconstruct(options: dict[str, Any]) -> None:
         "align",
         "deviation_limits",
     )
-    experiment_only = ("light", "variant", "ambient", "distortion", "second_sequence")
+    experiment_only = ("light", "variant", "distortion")
     for name in plan_only if experiment else experiment_only:
         if _is_set(options, name):
             kind = "an experiment" if experiment else "a plan"
@@ -156,10 +157,17 @@ def _check_reconstruct(options: dict[str, Any]) -> None:
                 f"--{name.replace('_', '-')} doesn't go with {kind}: it is of "
                 f"{'plans' if experiment else 'experiments'}"
             )
-    if options["single_shot"]:
-        for name in ("captures", "save_captures", "calibration", "second_sequence"):
-            if _is_set(options, name):
-                raise click.UsageError(
-                    f"give --single-shot or --{name.replace('_', '-')}, not both: "
-                    f"it is of coded sequences"
-                )
+    folders = ("captures", "save_captures")
+    for first, others, why in (
+        (
+            "single_shot",
+            (*folders, "calibration", "second_sequence"),
+            "it is of coded sequences",
+        ),
+        ("second_sequence", folders, "a folder holds one sequence"),
+        ("ambient", folders[:1], "images that were taken have their own"),
+    ):
+        for name in others:
+            if _is_set(options, first) and _is_set(options, name):
+                one, other = (f"--{each.replace('_', '-')}" for each in (first, name))
+                raise click.UsageError(f"give {one} or {other}, not both: {why}")

@@ -2,6 +2,7 @@
 
 from planning.model.document.check_records import ConfusionRecord, ReconstructionRecord
 from planning.model.document.part import Part
+from planning.model.requirements import CheckLimits
 
 from .audit_findings import AuditFindings
 
@@ -58,14 +59,26 @@ def compare_figures(
     return list(findings.failures)
 
 
-def contradictions(recorded: ReconstructionRecord | None) -> list[str]:
-    """Return where a recorded check contradicts itself: passed, but with failures."""
-    if recorded is None or recorded.passed is (not recorded.failures):
+def contradictions(
+    recorded: ReconstructionRecord | None, limits: CheckLimits
+) -> list[str]:
+    """Return where a recorded check contradicts itself, or the light it was to assume.
+
+    Passed, but with failures; in other room light than is required.
+    """
+    findings = AuditFindings("reconstruction")
+    if recorded is None:
         return []
-    return [
-        f"reconstruction.passed: claimed {recorded.passed!r}, but "
-        f"reconstruction.failures is {list(recorded.failures)!r}"
-    ]
+    findings.holds(
+        recorded.passed is (not recorded.failures),
+        "passed",
+        f"claimed {recorded.passed!r}, but reconstruction.failures is "
+        f"{list(recorded.failures)!r}",
+    )
+    if recorded.ambient is not None:
+        whose = "requirements.check.ambient"
+        findings.same("ambient", recorded.ambient, limits.ambient, whose)
+    return list(findings.failures)
 
 
 def _compare_shares(

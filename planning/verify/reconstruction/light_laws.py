@@ -75,6 +75,21 @@ class LightLaw:
         """Return p (n, 2) at points (n, 3) in the frame of the device or its rings."""
         return local[:, :2]
 
+    def chart(self, depth: Array) -> Array:
+        """Return the height z that is linear over |p| on a plane: z, or 1 / z."""
+        return depth
+
+    def chart_m(self, rho: Array, depth: Array) -> Array:
+        """Return lengths along the beam [m] for one of the chart at depths z."""
+        return np.ones_like(depth)
+
+    def slope_run(self, rho: Array, depth: Array) -> tuple[Array, Array]:
+        """Return (s, t) whose |dt / ds| is tan(incidence) across rings: |p| and z.
+
+        In diverging light the angle to the axis, and the logarithm of the length.
+        """
+        return rho, depth
+
     def ring_normals(self, outward: Array, rho: Array) -> Array:
         """Return unit normals (n, 3) of ring surfaces in the ring frame.
 
@@ -110,6 +125,15 @@ class _Diverging(LightLaw):
 
     def falloff(self, depth: Array) -> Array | float:
         return (float(np.median(depth)) / depth) ** 2
+
+    def chart(self, depth: Array) -> Array:
+        return 1.0 / depth
+
+    def chart_m(self, rho: Array, depth: Array) -> Array:
+        return depth**2 * np.sqrt(1.0 + rho**2)
+
+    def slope_run(self, rho: Array, depth: Array) -> tuple[Array, Array]:
+        return np.arctan(rho), np.log(depth * np.sqrt(1.0 + rho**2))
 
     def ring_normals(self, outward: Array, rho: Array) -> Array:
         slope = np.sqrt(1.0 + rho * rho)[:, None]

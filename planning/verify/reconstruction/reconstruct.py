@@ -1,5 +1,7 @@
 """The simulated reconstruction: render, decode, triangulate, merge, compare."""
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from geometry.mesh.sampling import sample_surface
@@ -17,7 +19,11 @@ from planning.verify.reconstruction.faults.measured_clouds import (
     MeasuredClouds,
     rejection,
 )
-from planning.verify.reconstruction.render.photometry import Photometry
+from planning.verify.reconstruction.patterns.second_sequence import (
+    both_sequences,
+    second_sequence,
+)
+from planning.verify.reconstruction.render.photometry import Photometry, assumed_light
 from planning.verify.reconstruction.render.rendered import (
     Progress,
     Spent,
@@ -51,10 +57,10 @@ def reconstruct(
         expected: Points of the surface to judge completeness on, and which of them the
             plan claims measured; those outside the target are left aside. By default
             fresh points of the target, whose completeness is reported but not judged.
-        photometry: Simulated light and sensor.
+        photometry: Simulated light and sensor; None: as the plan's check assumes.
         progress: Called with the pairs done and their total.
     """
-    light, spent = photometry or Photometry(), Spent()
+    light, spent = photometry or assumed_light(plan), Spent()
     decoded = decode_rendered(
         plan,
         truth or plan,
@@ -67,6 +73,76 @@ def reconstruct(
     return conclude(
         plan, decoded, seed=seed, expected=expected, photometry=light, spent=spent
     )
+
+
+@dataclass(frozen=True, eq=False)
+class BothSequences:
+    """What a first sequence gave, the rig of a second one, and what both give."""
+
+    first: Reconstruction
+    second: Scanner
+    both: Reconstruction
+
+
+def reconstruct_twice(
+    plan: Scanner,
+    *,
+    seed: int,
+    threads: int = 2,
+    mounted: Scanner | None = None,
+    expected: Expected | None = None,
+    photometry: Photometry | None = None,
+    progress: Progress | None = None,
+) -> BothSequences:
+    """Measure an object with the plan's rings, and once more with rings between them.
+
+    Where these lie follows from the first points (`second_sequence`). Arguments are as
+    of `reconstruct`; `mounted` is how the devices stand, as the decoder knows, too. The
+    second sequence's noise is another.
+    """
+    light, stands = photometry or assumed_light(plan), mounted or plan
+    pairs: list[Pairs] = []
+    second, first = plan, None
+    for turn in (0, 1):
+        spent = Spent()
+        pairs.append(
+            decode_rendered(
+                second,
+                stands,
+                light,
+                seed=seed + turn,
+                threads=threads,
+                progress=progress,
+                spent=spent,
+                believed=_ringed(stands, second),
+            )
+        )
+        if first is None:
+            first = conclude(
+                stands,
+                pairs[0],
+                seed=seed,
+                expected=expected,
+                photometry=light,
+                spent=spent,
+            )
+            second = second_sequence(stands, first.everything)
+    assert first is not None
+    rig, places = both_sequences(stands, second)
+    decoded = [
+        (pair, one.with_rings(own[pair[0]]))
+        for sequence, own in zip(pairs, places, strict=True)
+        for pair, one in sequence
+    ]
+    both = conclude(rig, decoded, seed=seed, expected=expected, photometry=light)
+    return BothSequences(first, second, both)
+
+
+def _ringed(stands: Scanner, design: Scanner) -> Scanner:
+    """Return devices as they stand, with the rings of a design."""
+    pairs = zip(stands.projectors, design.projectors, strict=True)
+    shown = tuple(replace(a, pattern=b.pattern) for a, b in pairs)
+    return replace(stands, projectors=shown)
 
 
 def conclude(

@@ -110,6 +110,10 @@ def audit_limits(case: AuditCase, findings: AuditFindings) -> None:
         required = getattr(getattr(case.plan.requirements, part), wish)
         key = f"requirements.{part}.{wish}"
         findings.same(key, required, truth, whose, _ROUNDING)
+    ambient = case.plan.document.rig.check.get("ambient")
+    if ambient is not None:
+        key, claimed = "requirements.check.ambient", case.plan.requirements.check
+        findings.same(key, claimed.ambient, ambient, "rig.check.ambient", _ROUNDING)
 
 
 def audit_scales(case: AuditCase, findings: AuditFindings) -> None:

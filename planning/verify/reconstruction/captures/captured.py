@@ -23,7 +23,7 @@ from planning.verify.reconstruction.decode.inspection import DarkError, inspect
 from planning.verify.reconstruction.faults.measured_clouds import rejection
 from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
 from planning.verify.reconstruction.reconstruct import conclude
-from planning.verify.reconstruction.render.photometry import Photometry
+from planning.verify.reconstruction.render.photometry import Photometry, assumed_light
 from planning.verify.reconstruction.render.rendered import (
     Progress,
     Spent,
@@ -60,14 +60,14 @@ def reconstruct_rendered(
         threads: Worker threads; the result doesn't depend on them.
         truth: What really stands there; the plan by default.
         believed: What the decoder knows of poses and optics; the plan by default.
-        photometry: Simulated light and sensor.
+        photometry: Simulated light and sensor; None: as the plan's check assumes.
         save: Where the images are written; None: nowhere.
         progress: Called with the pairs done and their total.
 
     Raises:
         OSError: If the images can't be written.
     """
-    light, spent = photometry or Photometry(), Spent()
+    light, spent = photometry or assumed_light(plan), Spent()
     inspection = _Inspection(plan)
 
     def develop(p: int, c: int, frames: Frames) -> Frames | None:

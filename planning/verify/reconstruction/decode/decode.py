@@ -1,6 +1,6 @@
 """Images to measured points, with no knowledge of the object."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,6 +72,15 @@ class Decoded:
     outcomes: NDArray[np.int8]
     n_saturated: int
     saturated: Array
+
+    def with_rings(self, numbers: Indices) -> "Decoded":
+        """Return this with the rings numbered anew, as a table of them says, (n,)."""
+        rings = np.where(self.edges.rings >= 0, numbers[self.edges.rings], -1)
+        return replace(
+            self,
+            cloud=replace(self.cloud, ring=numbers[self.cloud.ring].astype(np.int16)),
+            edges=replace(self.edges, rings=rings),
+        )
 
     @classmethod
     def nothing(cls) -> "Decoded":

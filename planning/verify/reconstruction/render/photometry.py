@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planning.verify.reconstruction.arrays import Array, Grey, Images
-from planning.verify.reconstruction.scanner import Defocus
+from planning.verify.reconstruction.scanner import Defocus, Scanner
 
 _WAVELENGTHS_M = (0.009, 0.017, 0.031)
 # Rows that are blurred at a time: what is between both passes stays in the cache.
@@ -104,6 +104,11 @@ class Photometry:
         variance += np.float32(self.read_noise**2)
         level += noise * np.sqrt(variance)
         return np.clip(np.rint(level), 0.0, 255.0).astype(np.uint8)
+
+
+def assumed_light(scanner: Scanner) -> Photometry:
+    """Return light and sensor that a plan's check assumes."""
+    return Photometry(ambient=scanner.limits.check.ambient)
 
 
 def _smooth(image: Grey, taps: Grey, first: int, last: int, out: Grey) -> None:

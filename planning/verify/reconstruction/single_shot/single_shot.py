@@ -22,7 +22,7 @@ from planning.verify.reconstruction.decode.decode import (
 from planning.verify.reconstruction.decode.edges import ImageEdges
 from planning.verify.reconstruction.patterns.ring_patterns import RingsForCamera
 from planning.verify.reconstruction.reconstruct import conclude
-from planning.verify.reconstruction.render.photometry import Photometry
+from planning.verify.reconstruction.render.photometry import Photometry, assumed_light
 from planning.verify.reconstruction.render.render import render_lines
 from planning.verify.reconstruction.render.rendered import (
     Progress,
@@ -67,6 +67,7 @@ def reconstruct_single_shot(
     *,
     tolerance_m: float,
     seed: int,
+    photometry: Photometry | None = None,
     progress: Progress | None = None,
 ) -> Reconstruction:
     """Measure the object of a plan from one image of each pair of devices.
@@ -76,9 +77,10 @@ def reconstruct_single_shot(
         expected: As in `reconstruct`; what sequences would measure.
         tolerance_m: How near the object is taken to lie to the mesh [m].
         seed: Of the pixel noise.
+        photometry: Simulated light and sensor; None: as the plan's check assumes.
         progress: Called with the pairs done and their total.
     """
-    light, spent = Photometry(), Spent()
+    light, spent = photometry or assumed_light(plan), Spent()
     with spent.on("decode"):
         shots = shoot_rig(
             plan,
