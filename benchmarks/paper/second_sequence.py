@@ -19,6 +19,7 @@ import platform
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -154,7 +155,7 @@ def chord_errors(
     share = (np.arange(PLACES) + 0.5) / PLACES
     turn = (np.arange(AZIMUTHS) + 0.5) * (2.0 * np.pi / AZIMUTHS)
     off, area = [], []
-    for a, b in zip(ends[:-1], ends[1:], strict=True):
+    for a, b in pairwise(ends):
         rho = np.concatenate([[a], a + (b - a) * share, [b]])
         z, lit = hits(projector, scanner, caster, rho, turn)
         s, t = light.slope_run(rho[:, None], z)
