@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from planning.model.planned import PlannedProjector
 from planning.proofs.candidate_certificate import PlannedStage, certified
@@ -108,11 +109,11 @@ def plan_projectors(
         poses = source.lattice(_FINER * n_candidates)
         return CandidateSet.over(scene, candidates.samples, poses)
 
-    attempt = 0
+    attempt, begun = 0, np.arange(n_lattice)
     while True:
         attempt += 1
         candidates, selection = _fewest(
-            source, candidates, n_lattice, finer, thorough=attempt == 1
+            source, candidates, begun, finer, thorough=attempt == 1
         )
         fresh = candidates.on(
             scene.target_samples(DRAWS.fresh_projectors.later(attempt))
@@ -121,6 +122,9 @@ def plan_projectors(
         if confirmed or selection.status == "infeasible" or attempt == rounds:
             break
         candidates = candidates.with_samples(fresh)
+        if scene.requirements.region_coverage:
+            # Floors leave little to spare: what nearly did is where to look on.
+            begun = np.union1d(begun, selection.chosen)
     if confirmed and selection.status != "infeasible":
         wider = _with_widest_margin(candidates, selection)
         selection = wider if fresh.cover.confirms(wider.chosen) else selection
@@ -130,18 +134,19 @@ def plan_projectors(
 def _fewest(
     source: CandidateSource,
     candidates: CandidateSet,
-    n_lattice: int,
+    begun: NDArray[np.int64],
     finer: Callable[[], CandidateSet],
     *,
     thorough: bool,
 ) -> tuple[CandidateSet, Selection]:
     """Return the fewest of the poses, with others as long as they save one.
 
-    Near misses are pursued on the first samples only: where fresh ones have joined
-    them, a cover so tight has failed already.
+    One fewer is looked for from the poses `begun`. Near misses are pursued on the first
+    samples only: where fresh ones have joined them, a cover so tight has failed
+    already.
     """
     selection = select_fewest(candidates.cover)
-    lattice, finer_once = candidates.take(np.arange(n_lattice)), cache(finer)
+    lattice, finer_once = candidates.take(begun), cache(finer)
     while selection.needed > candidates.n_existing + 1:
         moved = one_fewer(
             source,

@@ -89,6 +89,12 @@ class _Tree(Incumbent):
         self._open: list[tuple[float, int, GroupPart]] = []
         self.bounds = PartBounds(prices.priced, n_sets, self._least_priced, budget)
         self._alike = _likeness(self.bounds.covers, cover.weights)
+        sets, floors = np.arange(cover.quotas.size), cover.quotas > 0
+        floors &= cover.floored
+        of_set = (cover.row_sets == sets[floors, None]) * cover.weights
+        # Weight of each set in each row set with a floor, (n_s, n_floors).
+        self._shares = cover.by_set @ of_set.T
+        self._floors = cover.quotas[floors]
 
     def run(self, multipliers: NDArray[np.float64]) -> ExactSearch:
         whole = self.bounds.whole(multipliers / self.prices.priced.weights)
@@ -119,6 +125,7 @@ class _Tree(Incumbent):
     def _take(self, parts: list[GroupPart], steps: int) -> None:
         """Bound parts, look at what they would take, and keep those still open."""
         still: list[GroupPart] = []
+        parts = [part for part in parts if self._may_meet_floors(part)]
         for part in self.bounds.lowered(parts, steps):
             only = self._only(part)
             if only is not None:
@@ -130,6 +137,17 @@ class _Tree(Incumbent):
         for part in still:
             if part.bound >= self._least_priced:
                 heapq.heappush(self._open, (-part.bound, next(self._names), part))
+
+    def _may_meet_floors(self, part: GroupPart) -> bool:
+        """Whether a part's sets could meet each floor if they had no row in common."""
+        if not self._floors.size:
+            return True
+        spare = self.n_sets - len(part.groups)
+        most = sum((self._shares[g].max(axis=0) for g in part.groups), np.zeros(1))
+        if spare:
+            others = np.where(part.closed[:, None], 0.0, self._shares)
+            most = most + np.partition(others, -spare, axis=0)[-spare:].sum(axis=0)
+        return bool(np.all(most >= self._floors))
 
     def _try(self, chosen: NDArray[np.int64]) -> None:
         covered = self.bounds.covers[chosen].any(axis=0)
