@@ -85,7 +85,12 @@ def certified(
         proof=selection.proof,
     )
     if selection.floors is not None:
-        bound = bound.changed(for_total=min(selection.total_bound, count))
+        # So many candidates cover too little at most: it takes one more.
+        few = [
+            n for n, (_, most) in others.n_covered.items() if most < selection.required
+        ]
+        least = max(selection.total_bound, 1 + max(few, default=0))
+        bound = bound.changed(for_total=min(least, selection.lower_bound))
     proof = Certificate(
         count=count,
         status=selection.status,

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from planning.proofs.candidate_certificate import certified
+from planning.proofs.quotas import RegionFloors
 from planning.proofs.selection import CandidateCover, marginals, select_fewest
 
 
@@ -85,3 +86,19 @@ def test_the_same_question_gets_the_same_answer():
     again = select_fewest(CandidateCover(covers, 0.95, seed=3))
     assert first.chosen.tolist() == again.chosen.tolist()
     assert first.lower_bound == again.lower_bound
+
+
+@pytest.mark.parametrize(("dark", "total"), [(10, 2), (30, 3)])
+def test_a_certificate_says_what_the_total_takes_without_floors(dark, total):
+    """Two candidates cover all but a region, a third covers that: 90 % takes `total`."""
+    covers = np.zeros((100, 3), dtype=bool)
+    half = (100 - dark) // 2
+    covers[:half, 0] = covers[half : 2 * half, 1] = covers[2 * half :, 2] = True
+    floors = RegionFloors(np.repeat([0, 1], [100 - dark, dark]), 2, 0.5)
+    for most in (None, 2):
+        cover = CandidateCover(covers, 0.9, max_count=most, regions=floors)
+        _, proof = certified(cover, select_fewest(cover), 1.0)
+        assert (proof.needed.count, proof.needed.lower_bound) == (3, 3)
+        assert proof.candidates.for_total == total
+    plain = CandidateCover(covers, 0.9)
+    assert certified(plain, select_fewest(plain), 1.0)[1].candidates.for_total is None
