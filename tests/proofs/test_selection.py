@@ -90,7 +90,7 @@ def test_the_same_question_gets_the_same_answer():
 
 @pytest.mark.parametrize(("dark", "total"), [(10, 2), (30, 3)])
 def test_a_certificate_says_what_the_total_takes_without_floors(dark, total):
-    """Two candidates cover all but a region, a third covers that: 90 % takes `total`."""
+    """Two candidates cover all but a region, a third that: 90 % takes `total`."""
     covers = np.zeros((100, 3), dtype=bool)
     half = (100 - dark) // 2
     covers[:half, 0] = covers[half : 2 * half, 1] = covers[2 * half :, 2] = True
