@@ -23,13 +23,19 @@ from planning.scene.scene import Scene
 from solvers.covers.cover import solve_cover
 
 from .camera_cover import (
+    CameraCover,
     NothingMeasuredError,
     candidate_cover,
     measured_of,
     n_fixed,
 )
-from .camera_stage import CameraSolution, place_cameras
-from .proved_cameras import CameraStage
+from .camera_stage import (
+    AxesCover,
+    CameraSolution,
+    by_better_route,
+    cover_axes,
+    place_cameras,
+)
 
 
 def place_for_axes(
@@ -54,25 +60,24 @@ def place_for_axes(
         return place_cameras(scene, projectors, candidates, by)
     middle = centred_axes(scene, projectors, margin)
     try:
-        centred = place_cameras(scene, middle, candidates, by, "centred")
+        taken = cover_axes(scene, middle, candidates, by, "centred")
     except NothingMeasuredError:
         if axis == "centred":
             raise
         return place_cameras(scene, projectors, candidates, by)
-    if axis == "centred" or no_axes_need_fewer(scene, centred.stage):
-        return centred
-    free = place_cameras(scene, projectors, candidates, by)
-    return min(centred, free, key=_burden)
+    if axis == "auto" and not no_axes_need_fewer(scene, taken.cover):
+        free = cover_axes(scene, projectors, candidates, by, "free")
+        taken = min(taken, free, key=_burden)
+    return by_better_route(scene, taken, by)
 
 
-def no_axes_need_fewer(scene: Scene, stage: CameraStage) -> bool:
+def no_axes_need_fewer(scene: Scene, cover: CameraCover) -> bool:
     """Return whether the requirement is met, and by no fewer candidates of any axes.
 
     Whatever a camera measures it sees: no cover of what is seen with fewer cameras
     bounds those of all ring axes, for as many samples measured.
     """
-    cover = stage.cover
-    if stage.certificate.status == "infeasible":
+    if cover.selection.status == "infeasible":
         return False
     seen = np.zeros_like(cover.measured)
     for camera, view in enumerate(cover.candidates.on(cover.samples.target)):
@@ -80,7 +85,7 @@ def no_axes_need_fewer(scene: Scene, stage: CameraStage) -> bool:
     seen &= np.any(cover.measured, axis=1)[:, None]
     problem = candidate_cover(scene, seen, cover.samples).problem
     bound = solve_cover(problem, seed=scene.seed)
-    return bound.lower_bound >= len(stage.cameras)
+    return bound.lower_bound >= len(cover.cameras)
 
 
 def standing_axes(
@@ -136,8 +141,7 @@ def _with_rings_of(
     return replace(projector, world_from_ring=frame, ring_radii=template.ring_radii)
 
 
-def _burden(solution: CameraSolution) -> tuple[bool, int, int]:
+def _burden(chosen: AxesCover) -> tuple[bool, int, int]:
     """Smaller where the requirement is met, then with fewer cameras, then cheaper."""
-    cameras, proof = solution.stage.cameras, solution.stage.certificate
-    cost = pixels_read(solution.projectors, cameras)
-    return proof.status == "infeasible", len(cameras), cost
+    cameras, status = chosen.cover.cameras, chosen.cover.selection.status
+    return status == "infeasible", len(cameras), pixels_read(chosen.projectors, cameras)

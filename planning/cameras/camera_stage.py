@@ -39,12 +39,38 @@ def place_cameras(
     axes: AxisTaken = "free",
 ) -> CameraSolution:
     """Choose cameras, move free ring axes for them, and see which route is better."""
-    cover, moved = cover_for(scene, projectors, candidates, by), projectors
+    cover = cover_axes(scene, projectors, candidates, by, axes)
+    return by_better_route(scene, cover, by)
+
+
+@dataclass(frozen=True, eq=False)
+class AxesCover:
+    """A cover, and the projectors with the ring axes that it was solved for."""
+
+    projectors: tuple[PlannedProjector, ...]
+    cover: CameraCover
+    axes: AxisTaken
+
+
+def cover_axes(
+    scene: Scene,
+    projectors: tuple[PlannedProjector, ...],
+    candidates: CandidateViews,
+    by: CamerasBy,
+    axes: AxisTaken,
+) -> AxesCover:
+    """Choose cameras, and move free ring axes for them."""
+    cover = cover_for(scene, projectors, candidates, by)
     if axes == "free":
-        moved, cover = move_axes(scene, projectors, cover, by)
-    cover, routes, rival = better_route(scene, moved, cover, by)
+        projectors, cover = move_axes(scene, projectors, cover, by)
+    return AxesCover(projectors, cover, axes)
+
+
+def by_better_route(scene: Scene, chosen: AxesCover, by: CamerasBy) -> CameraSolution:
+    """Return the cameras of the cover, or of the paper's route if these are better."""
+    cover, routes, rival = better_route(scene, chosen.projectors, chosen.cover, by)
     stage = replace(camera_stage(scene, cover, routes), rival=rival)
-    return CameraSolution(moved, stage, axes)
+    return CameraSolution(chosen.projectors, stage, chosen.axes)
 
 
 def move_axes(

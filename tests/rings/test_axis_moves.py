@@ -9,8 +9,14 @@ from support.factories import make_camera, make_projector, make_requirements, ma
 
 from geometry.poses import inverse
 from geometry.shapes.primitives import sphere
+from planning.cameras.axis_choice import (
+    no_axes_need_fewer,
+    other_axes,
+    place_for_axes,
+)
 from planning.cameras.camera_cover import camera_candidate_views, plan_cameras
 from planning.cameras.camera_stage import (
+    cover_axes,
     follow_cameras,
     move_axes,
     proves_as_much,
@@ -25,6 +31,7 @@ from planning.rings.axis_moves import (
     move_ring_axes,
     proposals,
 )
+from planning.rings.centred_axes import centred_axes
 from planning.rings.ring_radii import uniform_radii
 from planning.scene import measurability
 from planning.scene.draws import Draw
@@ -249,6 +256,46 @@ def test_an_axis_and_its_ring_frame_are_the_same(ball):
             assert again == pytest.approx(frame, abs=1e-12)
             size = tilt if p.light == "parallel" else np.tan(tilt / 2)
             assert np.linalg.norm(axis) == pytest.approx(size)
+
+
+def test_auto_takes_centred_axes_where_they_cost_no_camera(ball):
+    """Two cameras measure 0.8 with centred axes; for 0.9 it takes free ones, or three.
+
+    One coverage a light: both take the same way.
+    """
+    whole, projectors, cover = ball
+    few = projectors[0].light == "parallel"
+    required = replace(whole.requirements, coverage=0.8 if few else 0.9)
+    scene, views = replace(whole, requirements=required), cover.candidates
+    auto = place_for_axes(scene, projectors, views, "cover", axis="auto", margin=5e-3)
+    assert (auto.axes, len(auto.stage.cameras)) == ("centred" if few else "free", 2)
+    middle = centred_axes(scene, projectors, 5e-3)
+    centred = cover_axes(scene, middle, views, "cover", "centred")
+    assert len(centred.cover.cameras) == (2 if few else 3)
+    assert centred.projectors == middle
+    alike = [
+        np.array_equal(a.world_from_ring, m.world_from_ring)
+        for a, m in zip(auto.projectors, middle, strict=True)
+    ]
+    assert all(alike) if few else not any(alike)
+    # The axes that weren't taken are there to compare, with rings that light the ball.
+    others = other_axes(scene, auto, auto.stage.cameras, projectors[0], 5e-3)
+    apart = [
+        np.abs(a.world_from_ring - o.world_from_ring).max()
+        for a, o in zip(auto.projectors, others, strict=True)
+    ]
+    assert min(apart) > 0.01
+
+
+def test_what_cameras_see_bounds_what_any_axes_need(ball):
+    """Three cameras where two see enough: no proof; two, which one can't replace."""
+    scene, _, cover = ball
+    chosen = cover.selection.chosen
+    assert no_axes_need_fewer(scene, cover)
+    spare = replace(cover.selection, chosen=np.append(chosen, [0]))
+    assert not no_axes_need_fewer(scene, replace(cover, selection=spare))
+    missed = replace(cover.selection, status="infeasible")
+    assert not no_axes_need_fewer(scene, replace(cover, selection=missed))
 
 
 def test_the_proof_is_of_the_axes_that_are_kept(ball, moved):
