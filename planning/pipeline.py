@@ -28,6 +28,7 @@ from planning.verify.verification import verify_plan
 
 from .prepare import prepared, request_of
 from .stages import (
+    as_they_stand,
     bounded_cameras,
     bounded_projectors,
     first_projectors,
@@ -36,7 +37,6 @@ from .stages import (
     polished,
     with_free_axes,
 )
-from .standing import as_they_stand
 
 Keep = Callable[[RigPlan], None]
 # Time kept for writing, in times that writing the first plan took.

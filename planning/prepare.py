@@ -12,19 +12,23 @@ from geometry.mesh.bearing import bearing
 from geometry.mesh.mesh import TriangleMesh
 from geometry.regions.regions import DominantRegions, dominant_regions
 from geometry.regions.selected_regions import regions_of_faces
+from planning.cameras.camera_cover import camera_candidate_views
+from planning.model.device_poses import moved_to
 from planning.model.errors import InputError
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
+from planning.projectors.candidate_set import CandidateSource
 from planning.report.partial_plan import PlanRequest, Prepared
 from planning.rig.range_guard import Guard, guarded
 from planning.rig.rig import Rig
 from planning.rig.wishes import TargetName, Wishes
 from planning.rings.ring_radii import ring_gap, uniform_radii
 from planning.scene.bodies.clearance import check_existing_clearance
+from planning.scene.camera_views import CandidateViews
 from planning.scene.interest import Select, Weight, interest_of
 from planning.scene.lights import light_of, ring_frame
-from planning.scene.placed_bodies import Obstruction
+from planning.scene.placed_bodies import Obstruction, existing_devices
 from planning.scene.ranges.ranged_body import RangedBody
 from planning.scene.scene import Scene
 
@@ -179,3 +183,27 @@ def _steep(regions: DominantRegions, target: str | None) -> NDArray[np.float64]:
     if target == "surface":
         return regions.steep
     return np.where((regions.face_region >= 0)[:, None], regions.steep, 0.0)
+
+
+def offered(ready: Prepared) -> tuple[tuple[PlannedProjector, ...], CandidateViews]:
+    """Existing devices and poses that define what is reachable: a plan's own, or new.
+
+    A plan's devices reach what they reached there.
+    """
+    scene, rig, mounted = ready.scene, ready.request.rig, ready.request.mounted
+    required = scene.requirements
+    known = None if mounted is None else mounted.reference(required.workspace)
+    if known is None:
+        source = CandidateSource(scene, ready.template)
+        views = camera_candidate_views(scene, ready.camera, rig.n_camera_poses)
+        return source.lattice(rig.n_projector_poses), views
+    frames = zip(known.reference_projectors, known.reference_rings, strict=True)
+    projectors = (
+        replace(ready.template, world_from_device=pose, world_from_ring=ring)
+        for pose, ring in frames
+    )
+    cameras = (moved_to(ready.camera, pose) for pose in known.reference_cameras)
+    return (
+        (*existing_devices(required, ready.template), *projectors),
+        CandidateViews(scene, (*existing_devices(required, ready.camera), *cameras)),
+    )

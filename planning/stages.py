@@ -3,11 +3,14 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from planning.cameras.axis_choice import other_axes, place_for_axes
+from planning.cameras.axis_choice import other_axes, place_for_axes, standing_axes
 from planning.cameras.baselines.widest_baselines import WidestBaselines
 from planning.cameras.camera_cover import (
+    CameraCover,
     NothingMeasuredError,
     camera_candidate_views,
+    candidate_cover,
+    measured_of,
 )
 from planning.cameras.camera_routes import cheapest, widest_routes
 from planning.cameras.camera_stage import CameraSolution, follow_cameras
@@ -18,13 +21,11 @@ from planning.model.document.device_records import RingAxis
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
-from planning.projectors.candidate_set import (
-    NothingLitError,
-)
+from planning.projectors.candidate_set import CandidateSet, NothingLitError
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import ProjectorStage, plan_projectors
 from planning.projectors.proved_projectors import prove_fewest
-from planning.proofs.candidate_certificate import larger
+from planning.proofs.candidate_certificate import larger, unproved, unsought
 from planning.report.advice.camera_relaxations import nothing_measured
 from planning.report.advice.projector_relaxations import nothing_lit
 from planning.report.advice.standing_inside import standing_inside
@@ -32,7 +33,9 @@ from planning.report.advice.what_helps import falls_short
 from planning.report.partial_plan import PartialPlan, Prepared
 from planning.report.region_claims import below_floor
 from planning.rings.ring_stage import space_rings
+from planning.scene.draws import DRAWS
 
+from .prepare import offered
 from .proofs import camera_bound, projector_bound
 
 
@@ -247,3 +250,39 @@ def one_device_more(
 def _bound_words(proof: Certificate) -> str:
     bound = proof.continuous
     return "" if bound is None else f"at least {bound.lower_bound}, {bound.proof}"
+
+
+def as_they_stand(ready: Prepared, clock: Stopwatch) -> PartialPlan:
+    """Return the existing devices with their rings, and what candidates would reach."""
+    request, scene = ready.request, ready.scene
+    with clock.stage("projectors", "projectors: what they light as they stand"):
+        poses, views = offered(ready)
+        samples = scene.target_samples(DRAWS.projectors)
+        candidates = CandidateSet.over(scene, samples, poses)
+        projectors = candidates.projectors[: candidates.n_existing]
+        proof = unproved(candidates.cover, candidates.samples.samples.weight)
+        stage = ProjectorStage(
+            {len(projectors): projectors}, proof, projectors, candidates
+        )
+    with clock.stage("cameras", "cameras: what they measure as they stand"):
+        cameras = views.cameras[: len(scene.requirements.existing_of("camera"))]
+        target = scene.target_samples(DRAWS.cameras)
+        asked, margin = request.ring_axis, request.ring_margin
+        projectors, axes = standing_axes(
+            scene, projectors, views, target, axis=asked, margin=margin
+        )
+        samples, measured = measured_of(scene, projectors, views, target)
+        cover = candidate_cover(scene, measured, samples)
+        proof = unproved(cover, target.samples.weight)
+        camera_stage = CameraStage(
+            {len(cameras): cameras},
+            proof,
+            cameras,
+            CameraCover(views, samples, measured, unsought(cover)),
+        )
+    with clock.stage("rings", "rings: radii for the surface and the cameras"):
+        spacing = request.rig.rings.spacing
+        rings = space_rings(scene, projectors, cameras, spacing, samples, margin=margin)
+    return PartialPlan(
+        ready, stage, projectors, camera_stage, cameras, axes=axes, rings=rings
+    )

@@ -166,3 +166,20 @@ def larger(stage: _S, present: Sequence[object], allowed: int | None) -> _S | No
         unknown = before.continuous.changed(one_fewer_upper_bound_m2=None)
         proof = proof.changed(continuous=unknown)
     return replace(stage, certificate=proof)
+
+
+def unsought(cover: CandidateCover) -> Selection:
+    """The existing devices as a selection that nothing was proved of."""
+    chosen = np.arange(cover.n_existing)
+    n_covered = cover.n_covered(chosen)
+    met = cover.enough(chosen)
+    return Selection(
+        chosen,
+        chosen,
+        0,
+        "feasible" if met else "infeasible",
+        "",
+        cover.required,
+        n_covered,
+        n_covered,
+    )
