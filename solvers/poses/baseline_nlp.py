@@ -1,6 +1,8 @@
 """The program of ``baseline_program`` in CasADi, one of its own for each problem."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -14,15 +16,19 @@ _Matrix = ca.SX | ca.DM
 _MEAN_WEIGHT = 0.05
 _THIN = 1e-6
 _SMOOTH = 1e-12
+# Of poses that violate limits as little, the nearest; and what slacks start from.
+_NEAR = 1e-3
+_SLACK = 0.1
 
 
 @dataclass(frozen=True, eq=False)
 class BaselineProgram:
-    """The stated program: x = (O_1, ..., O_k, t), minimise f, low <= g <= high.
+    """The stated program: minimise f, low <= g <= high.
 
     Attributes:
-        x: Variables, (3 k + 1, 1).
-        objective: f, to be minimised.
+        x: Variables O_1, ..., O_k, t, and of an elastic program the aims and what each
+            limit gives way by, (n, 1).
+        objective: f.
         constraints: g.
         low: Lower bounds of g.
         high: Upper bounds of g.
@@ -39,27 +45,40 @@ class BaselineProgram:
 
 def build_baseline_program(problem: BaselineProblem) -> BaselineProgram:
     """State the program."""
-    k = len(problem.centres)
-    x = ca.SX.sym("x", 3 * k + 1)
-    centres = ca.reshape(x[: 3 * k], 3, k).T
+    k, n_seams = len(problem.centres), len(problem.seams.points)
+    begin, aims = problem.centres.ravel(), ca.SX(problem.aims)
+    n_limits = n_seams + len(problem.kept.camera)
+    x, free, slack = ca.SX.sym("x", 3 * k + 1), ca.SX(0, 1), ca.SX.zeros(n_limits)
     t = x[3 * k]
-    axes = _unit(ca.SX(problem.aims) - centres)
+    if problem.elastic:
+        free, slack = ca.SX.sym("aims", 3 * k), ca.SX.sym("slack", n_limits)
+        aims = ca.reshape(free, 3, k).T
+    cameras = _Cameras(problem, ca.reshape(x[: 3 * k], 3, k).T, aims)
+    stated, covering = _Stated(), _Stated()
     apart = _norm(
-        _rows(centres, problem.pairs[:, 0]) - _rows(centres, problem.pairs[:, 1])
+        _rows(cameras.centres, problem.pairs[:, 0])
+        - _rows(cameras.centres, problem.pairs[:, 1])
     )
-    stated = _Stated()
-    stated.add(apart - t)
-    _state_workspace(stated, problem, centres)
-    covering = _Stated()
-    if len(problem.seams.points):
-        _state_seams(covering, problem, centres, axes)
+    if not problem.elastic:
+        stated.add(apart - t)
+    _state_workspace(stated, problem, cameras.centres)
+    if n_seams:
+        _state_seams(covering, problem, cameras, slack[:n_seams])
     if len(problem.kept.camera):
-        _state_kept(covering, problem, centres, axes)
-    start = np.append(problem.centres.ravel(), problem.smallest_baseline)
-    covering.admit(x, start)
-    objective = -t - _MEAN_WEIGHT * ca.sum1(apart) / len(problem.pairs)
+        _state_kept(covering, problem, cameras, slack[n_seams:])
+    every = ca.vertcat(x, free, slack) if problem.elastic else x
+    start = np.append(begin, problem.smallest_baseline)
+    if problem.elastic:
+        start = np.concatenate([start, problem.aims.ravel(), np.full(n_limits, _SLACK)])
+        start[3 * k] = 0.0
+        moved = ca.vertcat(x[: 3 * k] - begin, free - problem.aims.ravel())
+        objective = ca.dot(ca.DM(problem.weights), slack)
+        objective += _NEAR * ca.sumsqr(moved) / problem.max_step**2
+    else:
+        covering.admit(every, start)
+        objective = -t - _MEAN_WEIGHT * ca.sum1(apart) / len(problem.pairs)
     return BaselineProgram(
-        x,
+        every,
         objective,
         ca.vertcat(*stated.g, *covering.g),
         np.concatenate(stated.low + covering.low),
@@ -87,6 +106,28 @@ class _Stated:
             now = np.asarray(g(start), dtype=np.float64).ravel()
             self.low = [np.minimum(np.concatenate(self.low), now)]
             self.high = [np.maximum(np.concatenate(self.high), now)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Cameras:
+    """Cameras by their centres and aims, (k, 3) each."""
+
+    problem: BaselineProblem
+    centres: _Matrix
+    aims: _Matrix
+
+    @cached_property
+    def axes(self) -> _Matrix:
+        return _unit(self.aims - self.centres)
+
+    @cached_property
+    def sides(self) -> tuple[_Matrix, _Matrix]:
+        """The image's own x and y, each (k, 3): `look_at`, turned by the roll."""
+        z, up = self.axes, self.problem.shell.up
+        level = _unit(_cross(z, ca.repmat(ca.DM(up).T, z.shape[0], 1)))
+        down, roll = _cross(z, level), ca.DM(self.problem.rolls)
+        c, s = (ca.repmat(f(roll), 1, 3) for f in (ca.cos, ca.sin))
+        return c * level + s * down, c * down - s * level
 
 
 def _state_workspace(
@@ -118,17 +159,17 @@ def _state_workspace(
 
 
 def _state_seams(
-    stated: _Stated, problem: BaselineProblem, centres: _Matrix, axes: _Matrix
+    stated: _Stated, problem: BaselineProblem, cameras: _Cameras, slack: ca.SX
 ) -> None:
     """Camera 2 has left at E what camera 1 gives up there, and vice versa."""
-    left1, left2 = _seam_margins(problem, centres, axes)
+    left1, left2 = _seam_margins(problem, cameras.centres, cameras.axes)
     now1, _ = _seam_margins(
         problem, ca.DM(problem.centres), _unit(ca.DM(problem.aims - problem.centres))
     )
     reserve = ca.fmin(*now1)
     for first in left1:
         for second in left2:
-            stated.add(first - reserve + second)
+            stated.add(first - reserve + second + slack)
 
 
 def _seam_margins(
@@ -153,40 +194,51 @@ def _seam_margins(
 
 
 def _state_kept(
-    stated: _Stated, problem: BaselineProblem, centres: _Matrix, axes: _Matrix
+    stated: _Stated, problem: BaselineProblem, cameras: _Cameras, slack: ca.SX
 ) -> None:
     kept = problem.kept
-    ray = ca.DM(kept.points) - _rows(centres, kept.camera)
+    ray = ca.DM(kept.points) - _rows(cameras.centres, kept.camera)
     distance = _norm(ray)
-    stated.add(
-        -_dot(ray, ca.DM(kept.normals)) / distance, float(np.cos(problem.max_incidence))
-    )
-    stated.add(distance, problem.range_m[0], problem.range_m[1])
-    stated.add(_dot(ray, _rows(axes, kept.camera)) / distance - kept.field_cosine)
+    for margin in _view_margins(problem, cameras, ray, distance):
+        stated.add(margin + slack)
     ringed = np.flatnonzero(np.any(kept.ring_normals != 0.0, axis=1))
     if len(ringed):
-        _state_rings(stated, problem, _rows(ray, ringed), ringed)
+        for margin in _ring_margins(problem, _rows(ray, ringed), ringed):
+            stated.add(margin + slack[ringed.tolist()])
 
 
-def _state_rings(
-    stated: _Stated,
-    problem: BaselineProblem,
-    ray: _Matrix,
-    ringed: NDArray[np.int64],
-) -> None:
+def _view_margins(
+    problem: BaselineProblem, cameras: _Cameras, ray: _Matrix, distance: _Matrix
+) -> Iterator[_Matrix]:
+    """Yield what incidence, range and the four sides of the image leave."""
+    kept, (near, far) = problem.kept, problem.range_m
+    yield -_dot(ray, ca.DM(kept.normals)) / distance - np.cos(problem.max_incidence)
+    yield distance / near - 1.0
+    yield 1.0 - distance / far
+    depth = _dot(ray, _rows(cameras.axes, kept.camera)) / distance
+    for low, high, across in zip(*problem.sides, cameras.sides, strict=True):
+        aside = _dot(ray, _rows(across, kept.camera)) / distance
+        yield (aside - low * depth) / np.hypot(1.0, low)
+        yield (high * depth - aside) / np.hypot(1.0, high)
+
+
+def _ring_margins(
+    problem: BaselineProblem, ray: _Matrix, ringed: NDArray[np.int64]
+) -> Iterator[_Matrix]:
+    """Yield what |r.m|, s_N and ring pitch leave."""
     kept = problem.kept
     m, normal = kept.ring_normals[ringed], kept.normals[ringed]
     distance = _norm(ray)
     along = _dot(ray, ca.DM(m)) / distance
     facing = -_dot(ray, ca.DM(normal)) / distance
-    stated.add(along, problem.min_conditioning)
+    yield along - problem.min_conditioning
     slant = np.einsum("ij,ij->i", m, normal)
     square = along**2 + facing**2 + 2.0 * along * facing * ca.DM(slant)
     # v is null only where ring and surface are parallel; keep the root smooth there.
     spread = distance * ca.sqrt(square + _SMOOTH)
     for coefficient, needed in ((kept.sigma, along), (kept.pitch, facing)):
         if coefficient is not None:
-            stated.add(needed - spread * ca.DM(coefficient[ringed]))
+            yield needed - spread * ca.DM(coefficient[ringed])
 
 
 def _rows(matrix: _Matrix, index: NDArray[np.int64]) -> _Matrix:
@@ -203,3 +255,8 @@ def _norm(a: _Matrix) -> _Matrix:
 
 def _unit(a: _Matrix) -> _Matrix:
     return a / ca.repmat(_norm(a), 1, 3)
+
+
+def _cross(a: _Matrix, b: _Matrix) -> _Matrix:
+    columns = ((1, 2), (2, 0), (0, 1))
+    return ca.horzcat(*(a[:, i] * b[:, j] - a[:, j] * b[:, i] for i, j in columns))

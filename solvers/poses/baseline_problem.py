@@ -73,7 +73,6 @@ class KeptPoints:
         camera: Index of the camera, shape (m,).
         points: P in [m], shape (m, 3).
         normals: Unit normals, shape (m, 3).
-        field_cosine: Least cosine between ray and optical axis, shape (m,).
         ring_normals: Ring normals m, signed so that m.r > 0 at the start, shape (m, 3);
             zero rows don't bind.
         sigma: q in [1/m], shape (m,): s_N <= its limit; 0 doesn't bind; None: none.
@@ -83,7 +82,6 @@ class KeptPoints:
     camera: NDArray[np.int64]
     points: _Array
     normals: _Array
-    field_cosine: _Array
     ring_normals: _Array
     sigma: _Array | None = None
     pitch: _Array | None = None
@@ -100,12 +98,16 @@ class BaselineProblem:
         shell: Where centres may stand.
         seams: Where parts meet.
         kept: What each camera must keep.
+        rolls: Turns of the cameras about their axes against `look_at` [rad], (k,).
+        sides: Least and largest x/z and y/z in the image, shape (2, 2).
         max_incidence: theta in [rad].
         range_m: Least and largest |O - P| of kept points in [m].
         min_conditioning: e, least |r.m| of kept points.
         max_step: Farthest that a centre may move in [m].
         half_spaces: What else holds the centres.
         fixed: Cameras that stay where they are, wherever that is, shape (f,).
+        weights: None: baselines are maximised and no limit gives way. Else what a limit
+            that gives way costs, at seams and then at kept points, shape (s + m,).
     """
 
     centres: _Array
@@ -114,6 +116,8 @@ class BaselineProblem:
     shell: PositionShell
     seams: SeamPoints
     kept: KeptPoints
+    rolls: _Array
+    sides: _Array
     max_incidence: float
     range_m: tuple[float, float]
     min_conditioning: float
@@ -124,14 +128,16 @@ class BaselineProblem:
         )
     )
     fixed: tuple[int, ...] = ()
+    weights: _Array | None = None
 
     def __post_init__(self) -> None:
         k = len(self.centres)
         if self.centres.shape != (k, 3) or self.aims.shape != (k, 3):
             raise ValueError(f"centres and aims must be ({k}, 3)")
-        if self.pairs.ndim != 2 or self.pairs.shape[1] != 2 or len(self.pairs) < 1:
+        least = 0 if self.elastic else 1
+        if self.pairs.shape[1:] != (2,) or len(self.pairs) < least:
             raise ValueError(
-                f"pairs must be (p, 2) with p >= 1, got {self.pairs.shape}"
+                f"pairs must be (p, 2) with p >= {least}, got {self.pairs.shape}"
             )
         indices = [self.pairs, self.seams.cameras, self.kept.camera]
         indices += [self.half_spaces.camera, np.array(self.fixed, dtype=np.int64)]
@@ -143,8 +149,15 @@ class BaselineProblem:
             raise ValueError("an aim coincides with its camera's centre")
 
     @property
+    def elastic(self) -> bool:
+        """Whether limits give way."""
+        return self.weights is not None
+
+    @property
     def smallest_baseline(self) -> float:
-        """Smallest baseline of neighbours at the start in [m]."""
+        """Smallest baseline of neighbours at the start in [m]; 0 without any."""
+        if not len(self.pairs):
+            return 0.0
         return smallest_baseline(self.centres, self.pairs)
 
 

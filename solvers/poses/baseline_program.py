@@ -70,6 +70,8 @@ class BaselineSolution:
     problem: BaselineProblem
     status: SolveStatus
     centres: _Array
+    aims: _Array
+    slack: _Array
 
     @property
     def smallest_baseline(self) -> float:
@@ -86,9 +88,15 @@ def solve_baseline(problem: BaselineProblem) -> BaselineSolution:
     for barrier in _BARRIERS:
         run = _run_ipopt(problem, program, barrier)
         if run.success and np.all(np.isfinite(run.x)):
-            centres = run.x[:-1].reshape(-1, 3)
-            return BaselineSolution(problem, SolveStatus.LOCALLY_OPTIMAL, centres)
-    return BaselineSolution(problem, SolveStatus.UNKNOWN, problem.centres)
+            n = problem.centres.size
+            centres, rest = run.x[:n].reshape(-1, 3), run.x[n + 1 :]
+            aims = rest[:n].reshape(-1, 3) if problem.elastic else problem.aims
+            return BaselineSolution(
+                problem, SolveStatus.LOCALLY_OPTIMAL, centres, aims, rest[n:]
+            )
+    return BaselineSolution(
+        problem, SolveStatus.UNKNOWN, problem.centres, problem.aims, np.zeros(0)
+    )
 
 
 def _run_ipopt(
@@ -110,15 +118,25 @@ def _run_ipopt(
             "no_nlp_grad": True,
         },
     )
-    # The step's ball holds these bounds too; they keep iterates from running away.
-    reach = np.full(len(program.start) - 1, 1.1 * problem.max_step)
-    longest = 2.0 * (np.abs(program.start[:-1]).max() + reach[0])
-    reach.reshape(-1, 3)[list(problem.fixed)] = 0.0
+    reach = _reach(problem, len(program.start))
     return run_solver(
         solver,
         x0=program.start,
-        lbx=np.append(program.start[:-1] - reach, 0.0),
-        ubx=np.append(program.start[:-1] + reach, 2.0 * longest),
+        lbx=np.maximum(program.start - reach, np.where(np.isinf(reach), 0.0, -np.inf)),
+        ubx=program.start + reach,
         lbg=program.low,
         ubg=program.high,
     )
+
+
+def _reach(problem: BaselineProblem, n: int) -> _Array:
+    """How far each variable may go, (n,): t and slacks are held from below alone."""
+    reach, k3 = np.full(n, np.inf), problem.centres.size
+    # The step's ball holds these bounds too; they keep iterates from running away.
+    moves = np.full(problem.centres.shape, 1.1 * problem.max_step)
+    moves[list(problem.fixed)] = 0.0
+    reach[:k3] = moves.ravel()
+    if problem.elastic:
+        reach[k3] = 0.0
+        reach[k3 + 1 : 2 * k3 + 1] = moves.ravel()
+    return reach

@@ -1,7 +1,7 @@
 """Which route's cameras stand, what the certificate says of both, and who believes it.
 
 A ball that three projectors light: three cameras measure what is lit, if they stand at
-the right places. Sixteen candidates don't, so a cover of them takes four or five.
+the right places. Forty candidates don't, so a cover of them takes four.
 """
 
 import copy
@@ -73,9 +73,9 @@ def ball():
 
 @pytest.fixture(scope="module")
 def coarse(ball):
-    """A cover of sixteen candidates, and what the default makes of it."""
+    """A cover of forty candidates, and what the default makes of it."""
     scene, projectors, camera = ball
-    offered = camera_candidate_views(scene, camera, 16)
+    offered = camera_candidate_views(scene, camera, 40)
     cover = cover_by_cover(scene, projectors, offered)
     return cover, *better_route(scene, projectors, cover, "both")
 
@@ -102,7 +102,7 @@ def test_fewer_by_the_paper_join_the_candidates_and_the_proof(ball, coarse):
     proof = camera_stage(scene, better).certificate.to_document()
     assert proof["count"] == proof["needed"]["count"] == 3
     assert proof["candidates"]["lower_bound"] <= 3
-    assert proof["candidates"]["n_candidates"] == len(better.candidates.cameras) > 16
+    assert proof["candidates"]["n_candidates"] == len(better.candidates.cameras) > 40
     # The three are among what was proved over, and measure what is asked of all of it.
     rows = lit_samples(scene, projectors, scene.target_samples(Draw(6000, 901)))
     held = measured_by(scene, better.candidates.cameras, rows)

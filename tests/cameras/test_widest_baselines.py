@@ -261,7 +261,13 @@ def test_seams_keep_free_what_is_asked_of_the_half_fields(pair):
             surface,
             BaselineLimits(THETA, 0.1, _workspace(), spare_field=spare),
         )
-        .problem(np.zeros((2, 3)), [(0, 1)], np.zeros((0, 2), dtype=np.int64), 0.1)
+        .problem(
+            np.zeros((2, 3)),
+            np.zeros(2),
+            [(0, 1)],
+            np.zeros((0, 2), dtype=np.int64),
+            0.1,
+        )
         .seams.half_fields
         for spare in (0.0, 0.02)
     )

@@ -4,12 +4,13 @@ Seams and kept samples are drawn from what is measured now; samples that a propo
 come back as kept ones, so that the next one knows of them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.devices import PinholeModel
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import Workspace
 from planning.scene.workspace.admissible import half_spaces
@@ -22,9 +23,9 @@ from solvers.poses.baseline_problem import (
 )
 
 from .baseline_limits import BaselineLimits, RingsOnSurface, best_rings
-from .baseline_rows import check_seam, half_field
+from .baseline_rows import check_seam
 from .camera_moves import poses_of
-from .seams import SampledSurface, both_orders, find_seams
+from .seams import SampledSurface, Seam, both_orders, find_seams, spread_points
 
 _Array = NDArray[np.float64]
 
@@ -40,6 +41,8 @@ _SPARE_FIELD = np.radians(0.1)
 _SPARE_CONDITIONING = 0.002
 _COMFORT = np.radians(5.0)
 _EASE = 0.03
+# Places along a border of the image.
+_BORDER = 9
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,22 +58,58 @@ class BaselineTerms:
     def problem(
         self,
         aims: _Array,
+        rolls: _Array,
         pairs: Sequence[tuple[int, int]],
         demanded: NDArray[np.int64],
         max_step: float,
     ) -> BaselineProblem:
         """Return the program for neighbours that look at `aims` in [m], (k, 3).
 
-        `demanded` are (camera, sample) pairs that must be kept besides the drawn ones,
-        (q, 2). No centre moves farther than `max_step` [m].
+        `rolls` are turns against `look_at` in [rad]. `demanded` are (camera, sample)
+        pairs that must be kept besides the drawn ones, (q, 2). No centre moves farther
+        than `max_step` [m].
         """
+        kept = np.unique(np.concatenate([self._sole_samples(), demanded]), axis=0)
+        seams = find_seams(both_orders(pairs), self.surface, self.measured_by)
+        points, _ = self._seam_points(seam for seam in seams if seam.shares_border)
+        index = np.array(pairs, dtype=np.int64)
+        return self._stated(aims, rolls, index, points, kept, max_step)
+
+    def elastic(
+        self,
+        aims: _Array,
+        rolls: _Array,
+        seams: Iterable[Seam],
+        kept: NDArray[np.int64],
+        weights: _Array,
+        max_step: float,
+    ) -> BaselineProblem:
+        """Return the elastic program: seams, and pairs (camera, sample) with weights.
+
+        A seam weighs as many samples as it has; centres and aims move no farther than
+        `max_step` [m].
+        """
+        points, counts = self._seam_points(seams)
+        index = np.zeros((0, 2), dtype=np.int64)
+        cost = np.concatenate([counts, weights])
+        return self._stated(aims, rolls, index, points, kept, max_step, cost)
+
+    def _stated(
+        self,
+        aims: _Array,
+        rolls: _Array,
+        pairs: NDArray[np.int64],
+        seams: SeamPoints,
+        kept: NDArray[np.int64],
+        max_step: float,
+        weights: _Array | None = None,
+    ) -> BaselineProblem:
         limits, cameras = self.limits, self.cameras
         space = limits.workspace
-        kept = np.unique(np.concatenate([self._sole_samples(), demanded]), axis=0)
         return BaselineProblem(
             centres=poses_of(cameras)[:, :3, 3],
             aims=aims,
-            pairs=np.array(pairs, dtype=np.int64),
+            pairs=pairs,
             shell=PositionShell(
                 np.array(space.centre),
                 space.camera_radius_m,
@@ -79,14 +118,17 @@ class BaselineTerms:
                 np.array(space.up),
                 space.floor_m,
             ),
-            seams=self._seam_points(pairs),
+            seams=seams,
             kept=self._kept_points(kept),
+            rolls=rolls,
+            sides=image_sides(cameras[0].device, _SPARE_FIELD),
             max_incidence=limits.max_incidence - _SPARE_INCIDENCE,
             range_m=cameras[0].device.range_m,
             min_conditioning=limits.min_conditioning + _SPARE_CONDITIONING,
             max_step=max_step,
             half_spaces=_held_in(space, cameras),
             fixed=tuple(c for c, camera in enumerate(cameras) if camera.existing),
+            weights=weights,
         )
 
     def holders(self, lost: NDArray[np.int64], centres: _Array) -> NDArray[np.int64]:
@@ -102,18 +144,19 @@ class BaselineTerms:
         holder = np.argmax(np.where(self.measured_by[lost], facing, -2.0), axis=1)
         return np.column_stack([holder, lost]).astype(np.int64)
 
-    def _seam_points(self, pairs: Sequence[tuple[int, int]]) -> SeamPoints:
+    def _seam_points(self, seams: Iterable[Seam]) -> tuple[SeamPoints, _Array]:
+        """Points at which (10) is stated, and how many samples each stands for."""
         spare, none = max(_SPARE_FIELD, self.limits.spare_field), np.zeros((0, 3))
         fields = np.zeros((0, 2))
-        seams = [(fields.astype(np.int64), none, none, none, np.zeros(0), fields)]
-        for seam in find_seams(both_orders(pairs), self.surface, self.measured_by):
-            if not seam.shares_border:
-                continue
+        rows = [(fields.astype(np.int64), none, none, none, np.zeros(0), fields)]
+        counts = [np.zeros(0)]
+        for seam in seams:
             pair = [self.cameras[index] for index in seam.cameras]
             test = check_seam(pair, self.surface, seam, self.limits.max_incidence)
             some = _tight_and_apart(test.slack, test.points, _SEAM_POINTS)
+            counts.append(np.full(len(some), len(seam.points) / len(some)))
             fields = np.column_stack([test.half_field1, test.half_field2])
-            seams.append(
+            rows.append(
                 (
                     np.tile(np.array(seam.cameras), (len(some), 1)),
                     test.points[some],
@@ -123,7 +166,8 @@ class BaselineTerms:
                     fields[some] - spare,
                 )
             )
-        return SeamPoints(*(np.concatenate(x) for x in zip(*seams, strict=True)))
+        points = SeamPoints(*(np.concatenate(x) for x in zip(*rows, strict=True)))
+        return points, np.concatenate(counts)
 
     def _sole_samples(self) -> NDArray[np.int64]:
         """Some of what each camera alone measures, the most oblique and well apart.
@@ -153,16 +197,15 @@ class BaselineTerms:
     def _kept_points(self, kept: NDArray[np.int64]) -> KeptPoints:
         index, samples = kept[:, 0], kept[:, 1]
         points, normals = self.surface.points[samples], self.surface.normals[samples]
-        cosine, sigma, pitch = (np.zeros(len(kept)) for _ in range(3))
+        sigma, pitch = np.zeros(len(kept)), np.zeros(len(kept))
         across = np.zeros((len(kept), 3))
         for c in np.unique(index):
             mine, camera = np.flatnonzero(index == c), self.cameras[c]
-            cosine[mine] = _field_cosines(camera, points[mine])
             if self.rings is not None:
                 across[mine], sigma[mine], pitch[mine], _ = best_rings(
                     camera, samples[mine], self.surface, self.rings, self.limits
                 )
-        return KeptPoints(index, points, normals, cosine, across, sigma, pitch)
+        return KeptPoints(index, points, normals, across, sigma, pitch)
 
 
 def _held_in(workspace: Workspace, cameras: Sequence[PlannedCamera]) -> HalfSpaces:
@@ -177,29 +220,27 @@ def _held_in(workspace: Workspace, cameras: Sequence[PlannedCamera]) -> HalfSpac
     )
 
 
-def _field_cosines(camera: PlannedCamera, points: _Array) -> _Array:
-    """Cosine of the half field in the plane of the axis and each point."""
-    axis = camera.world_from_device[:3, 2]
-    ray = points - camera.world_from_device[:3, 3]
-    depth = ray @ axis
-    aside = ray - depth[:, None] * axis
-    distance = np.linalg.norm(aside, axis=1)
-    centred = distance <= 1e-12
-    aside = np.where(centred[:, None], camera.world_from_device[:3, 0], aside)
-    towards = aside / np.linalg.norm(aside, axis=1, keepdims=True)
-    along = np.broadcast_to(axis, towards.shape)
-    half = half_field(camera, along, towards, np.arctan2(distance, depth))
-    return np.cos(half - _SPARE_FIELD)
+def image_sides(device: PinholeModel, spare: float) -> _Array:
+    """Return the least and largest x/z and y/z of a rectangle in the image, (2, 2).
+
+    So many radians stay free on every side. Under distortion it is the largest upright
+    one that the borders leave about the middle.
+    """
+    width, height = device.resolution
+    edge = np.linspace(0.0, 1.0, _BORDER)[:, None]
+    low, high = np.array([-0.5, -0.5]), np.array([width, height]) - 0.5
+    sides = np.empty((2, 2))
+    for axis, other in ((0, 1), (1, 0)):
+        for end, value in enumerate((low, high)):
+            border = np.empty((_BORDER, 2))
+            border[:, axis] = value[axis]
+            border[:, other] = (low + edge * (high - low))[:, other]
+            rays = device.rays(border)
+            slope = np.arctan2(rays[:, axis], rays[:, 2])
+            sides[end, axis] = slope.min() - spare if end else slope.max() + spare
+    return np.tan(sides)
 
 
 def _tight_and_apart(tightness: _Array, points: _Array, n: int) -> NDArray[np.int64]:
     """Half of n the tightest (least), half farthest from each other; all if fewer."""
-    if len(points) <= n:
-        return np.arange(len(points))
-    chosen = list(np.argsort(tightness, kind="stable")[: n // 2])
-    gap = np.min(np.linalg.norm(points[:, None] - points[chosen][None], axis=2), axis=1)
-    while len(chosen) < n:
-        farthest = int(np.argmax(gap))
-        chosen.append(farthest)
-        gap = np.minimum(gap, np.linalg.norm(points - points[farthest], axis=1))
-    return np.array(sorted(chosen), dtype=np.int64)
+    return spread_points(points, n, np.argsort(tightness, kind="stable"))

@@ -9,8 +9,13 @@ from geometry.poses import look_at
 from planning.model.device_poses import moved_to
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import Workspace
+from planning.scene.workspace.admissible import admissible
+from planning.scene.workspace.mount_settings import settable
 
 _Array = NDArray[np.float64]
+
+# Programs end on a limit to their own rounding.
+_SLACK = 1e-7
 
 
 def poses_of(cameras: Sequence[PlannedCamera]) -> _Array:
@@ -46,6 +51,38 @@ def aims_and_rolls(
     x = poses[:, :3, 0]
     along, aside = (np.einsum("ij,ij->i", x, level[:, :3, k]) for k in (0, 1))
     return aims, np.arctan2(aside, along)
+
+
+def between(
+    cameras: Sequence[PlannedCamera],
+    looks: tuple[_Array, _Array],
+    centres: _Array,
+    aims: _Array,
+    share: float | _Array,
+    workspace: Workspace,
+) -> _Array | None:
+    """Return poses (k, 4, 4) part of the way to other centres and aims, (k, 3) [m].
+
+    `looks` are the aims and rolls of the cameras now. Existing ones stay; mounts take
+    the next settings that they have. None where a camera can't stand so.
+    """
+    start, (now, rolls) = poses_of(cameras), looks
+    shares = np.broadcast_to(share, len(start))
+    places = centres_between(start[:, :3, 3], centres, shares, workspace)
+    targets = now + shares[:, None] * (aims - now)
+    up = np.array(workspace.up)
+    for c, camera in enumerate(cameras):
+        if camera.existing:
+            continue
+        pose = look_at(places[c], targets[c], up, roll=float(rolls[c]))
+        settings = settable(workspace, camera, pose[None])
+        if not len(settings):
+            return None
+        start[c] = settings[0]
+    free = [not camera.existing for camera in cameras]
+    offsets = start[free, :3, 3] - np.array(workspace.centre)
+    radius = workspace.camera_radius_m
+    return start if admissible(workspace, radius, offsets, slack=_SLACK).all() else None
 
 
 def centres_between(

@@ -177,6 +177,25 @@ def overlap_components(measured_by: NDArray[np.bool_]) -> list[list[int]]:
     return list(groups.values())
 
 
+def spread_points(
+    points: _Array, n: int, first: NDArray[np.int64] | None = None
+) -> NDArray[np.int64]:
+    """Return n of the points: up to half of them the `first`, the others far apart.
+
+    All of them if there are no more.
+    """
+    if len(points) <= n:
+        return np.arange(len(points))
+    chosen = [] if first is None else first[: n // 2].tolist()
+    chosen = chosen or [0]
+    gap = np.min(np.linalg.norm(points[:, None] - points[chosen][None], axis=2), axis=1)
+    while len(chosen) < n:
+        farthest = int(np.argmax(gap))
+        chosen.append(farthest)
+        gap = np.minimum(gap, np.linalg.norm(points - points[farthest], axis=1))
+    return np.array(sorted(chosen), dtype=np.int64)
+
+
 def _mean(points: _Array, chosen: NDArray[np.bool_]) -> _Array:
     """Mean of the chosen points; of all where none is."""
     return points[chosen if chosen.any() else slice(None)].mean(axis=0)

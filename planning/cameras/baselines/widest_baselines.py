@@ -11,15 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.poses import look_at
 from planning.model.planned import PlannedCamera
-from planning.scene.workspace.admissible import admissible
-from planning.scene.workspace.mount_settings import settable
 from solvers.poses.baseline_problem import smallest_baseline
 
 from .baseline_limits import BaselineLimits, RingsOnSurface
 from .baseline_terms import BaselineTerms
-from .camera_moves import aims_and_rolls, at_poses, centres_between, poses_of
+from .camera_moves import aims_and_rolls, at_poses, between, centres_between, poses_of
 from .seams import SampledSurface, neighbouring_pairs, overlap_components
 
 _Array = NDArray[np.float64]
@@ -35,8 +32,6 @@ _SHRINK = 0.4
 _REPEATS = 4
 # Gains below this share of a baseline aren't worth an evaluation.
 _GAIN = 1e-2
-# Programs end on a limit to their own rounding.
-_SLACK = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,16 +93,13 @@ class BaselineSearch:
         )
         self._pairs = neighbouring_pairs(self._measured, self.surface)
         self._groups = len(overlap_components(self._measured))
-        self._free = np.array([not camera.existing for camera in self.cameras])
-        mount = self.limits.workspace.camera_mount
-        self._stepped = mount is not None and mount.is_stepped
 
     def run(self) -> WidestBaselines:
         """Return the cameras where no further move is taken, or the budget is spent."""
         before = self._smallest()
         radius = self.limits.workspace.camera_radius_m[1]
         reach = _REACH * radius
-        movable = bool(self._pairs) and bool(self._free.any())
+        movable = bool(self._pairs) and not all(c.existing for c in self.cameras)
         while movable and self._affords() and reach >= _MIN_REACH * radius:
             taken, proposed = self._improve(reach)
             if not taken:
@@ -141,7 +133,7 @@ class BaselineSearch:
                 self.rings,
             )
             solution = solve_baseline(
-                terms.problem(self._aims, self._pairs, demanded, reach)
+                terms.problem(self._aims, self._rolls, self._pairs, demanded, reach)
             )
             if not (solution.status.has_point and self._gains(solution.centres)):
                 break
@@ -175,17 +167,14 @@ class BaselineSearch:
     def _attempt(self, centres: _Array) -> tuple[bool, NDArray[np.int64]]:
         """Take a move if rays allow it; else which samples it loses."""
         none = np.zeros(0, dtype=np.int64)
-        if self._spent >= self.max_evaluations or not self._admissible(centres):
+        if self._spent >= self.max_evaluations:
             return False, none
-        up = np.array(self.limits.workspace.up)
-        looks = zip(centres, self._aims, self._rolls, strict=True)
-        poses = np.stack([look_at(c, aim, up, roll=float(r)) for c, aim, r in looks])
-        poses[~self._free] = self._poses[~self._free]
-        if self._stepped:
-            settings = self._settable(poses)
-            if settings is None or not self._gains(settings[:, :3, 3]):
-                return False, none
-            poses, centres = settings, settings[:, :3, 3]
+        cameras, space = at_poses(self.cameras, self._poses), self.limits.workspace
+        looks = (self._aims, self._rolls)
+        poses = between(cameras, looks, centres, self._aims, 1.0, space)
+        if poses is None or not self._gains(poses[:, :3, 3]):
+            return False, none
+        centres = poses[:, :3, 3]
         measured = self._evaluate(poses)
         lost = np.flatnonzero(self._measured.any(axis=1) & ~measured.any(axis=1))
         if _count(measured) < self._floor:
@@ -202,16 +191,6 @@ class BaselineSearch:
         self._poses, self._measured, self._pairs = poses, measured, pairs
         return True, none
 
-    def _settable(self, poses: _Array) -> _Array | None:
-        """The poses that mounts can be set to next to these; None: one has none."""
-        space, found = self.limits.workspace, poses.copy()
-        for c in map(int, np.flatnonzero(self._free)):
-            setting = settable(space, self.cameras[c], poses[[c]])
-            if not len(setting):
-                return None
-            found[c] = setting[0]
-        return found
-
     def _between(self, centres: _Array, share: _Array) -> _Array:
         start = self._poses[:, :3, 3]
         return centres_between(start, centres, share, self.limits.workspace)
@@ -226,12 +205,6 @@ class BaselineSearch:
         if new.min() >= old.min() * (1.0 + _GAIN):
             return True
         return bool(new.min() >= old.min() and new.mean() >= old.mean() * (1.0 + _GAIN))
-
-    def _admissible(self, centres: _Array) -> bool:
-        space = self.limits.workspace
-        offsets = centres[self._free] - np.array(space.centre)
-        radius = space.camera_radius_m
-        return bool(np.all(admissible(space, radius, offsets, slack=_SLACK)))
 
     def _by_baseline(self) -> list[int]:
         """Cameras, those of the shortest baselines first."""

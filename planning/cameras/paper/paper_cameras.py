@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.cameras.baselines.widest_baselines import WidestBaselines
 from planning.cameras.camera_baselines import (
     BaselineSamples,
     baseline_limits,
@@ -25,15 +26,11 @@ from planning.cameras.camera_cover import (
 )
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.proofs.quotas import required_samples
 from planning.proofs.selection import Selection
-from planning.scene.bodies.clearance import with_clearance
 from planning.scene.camera_views import CandidateViews
 from planning.scene.draws import DRAWS
 from planning.scene.measured import LitSamples, measured_by, taken
-from planning.scene.placed_bodies import movable
 from planning.scene.scene import Scene
-from planning.scene.workspace.candidates import Candidates
 from solvers import solve_cover
 
 from .paper_route import PaperRoute, paper_route
@@ -107,7 +104,13 @@ def again_by_paper(
     """Return the cameras of a route under other ring axes: kept, and measured anew."""
     samples, measured = measured_samples(scene, projectors, cover.candidates)
     route = _judged(
-        scene, cover.candidates, measured, cover.by_count or {}, least=1, without=0.0
+        scene,
+        cover.candidates,
+        samples,
+        measured,
+        cover.by_count or {},
+        least=1,
+        without=0.0,
     )
     return cover_of(scene, projectors, samples, route)
 
@@ -129,9 +132,8 @@ def route_among(
     )
     few = taken(samples, some, samples.lit)
     reachable = np.any(measured[some], axis=1)
-    required = required_samples(reachable, scene.requirements.coverage)
     on = BaselineSamples(scene, projectors, few)
-    route = paper_route(_route_problem(on, candidates, required))
+    route = paper_route(_route_problem(on, candidates, measured[some]))
     if not route.by_count:
         raise InfeasibleLimitsError(
             "the paper's route found no camera that measures a lit sample, though "
@@ -144,6 +146,7 @@ def route_among(
     return _judged(
         scene,
         joined,
+        samples,
         np.concatenate([measured, passed], axis=1),
         by_count,
         least=len(route.cameras.cameras),
@@ -154,6 +157,7 @@ def route_among(
 def _judged(
     scene: Scene,
     candidates: CandidateViews,
+    samples: LitSamples,
     measured: NDArray[np.bool_],
     by_count: Mapping[int, NDArray[np.int64]],
     *,
@@ -161,44 +165,40 @@ def _judged(
     without: float,
 ) -> RouteCameras:
     """Say with how many of its cameras, at least so many, the route is enough."""
-    required = required_samples(np.any(measured, axis=1), scene.requirements.coverage)
+    cover = candidate_cover(scene, measured, samples)
     enough = (
         n
         for n, chosen in sorted(by_count.items())
-        if n >= least and measured[:, chosen].any(axis=1).sum() >= required
+        if n >= least and cover.enough(chosen)
     )
     return RouteCameras(candidates, measured, by_count, next(enough, None), without)
 
 
 def _route_problem(
-    on: BaselineSamples, candidates: CandidateViews, required: int
+    on: BaselineSamples, candidates: CandidateViews, measured: NDArray[np.bool_]
 ) -> RouteProblem:
-    scene, space = on.scene, on.scene.safe_workspace
-    template = movable(candidates.cameras)[-1]
-    offer = Candidates(template, space, scene.site("camera", template.device))
-    fixed = candidates.cameras[: n_fixed(scene)]
-    least_lit = on.count_lit(fixed)
+    scene, n = on.scene, n_fixed(on.scene)
+    least_lit = on.count_lit(candidates.cameras[:n])
     none = np.zeros((len(on.lit.target), 0), dtype=bool)
 
-    def alone(cameras: Sequence[PlannedCamera]) -> NDArray[np.bool_]:
-        return measured_by(scene, cameras, on.lit) if cameras else none
+    def together(cameras: Sequence[PlannedCamera]) -> NDArray[np.bool_]:
+        return on.measured(cameras, least_lit) if cameras else none
 
-    def stand(directions: NDArray[np.float64]) -> Cameras:
-        return with_clearance(scene, offer.towards(directions))
+    def widen(cameras: Sequence[PlannedCamera]) -> WidestBaselines:
+        return widen_baselines(
+            on, cameras, max_evaluations=_EVALUATIONS, max_programs=_PROGRAMS
+        )
 
     return RouteProblem(
         on.surface,
-        alone,
-        lambda cameras: on.measured(cameras, least_lit) if cameras else none,
-        stand,
-        lambda cameras: widen_baselines(
-            on, cameras, max_evaluations=_EVALUATIONS, max_programs=_PROGRAMS
-        ),
-        template.device,
-        offer.middle_radius_m,
         baseline_limits(scene),
-        required,
-        fixed,
+        candidates.cameras,
+        measured,
+        together,
+        widen,
+        candidate_cover(scene, measured, on.lit).quotas,
+        n,
+        on.rings,
     )
 
 
@@ -206,10 +206,13 @@ def _joined(
     candidates: CandidateViews, route: PaperRoute, n_fixed: int
 ) -> tuple[CandidateViews, dict[int, NDArray[np.int64]]]:
     """The candidates with the route's cameras, and which are those of each count."""
-    passed: dict[int, PlannedCamera] = {}
+    place = {id(camera): i for i, camera in enumerate(candidates.cameras)}
+    passed: list[PlannedCamera] = []
     for _, cameras in sorted(route.by_count.items()):
-        passed |= {id(camera): camera for camera in cameras[n_fixed:]}
-    place = {key: len(candidates.cameras) + i for i, key in enumerate(passed)}
+        for camera in cameras:
+            if id(camera) not in place:
+                place[id(camera)] = len(candidates.cameras) + len(passed)
+                passed.append(camera)
     by_count = {
         count: np.array(
             [*range(n_fixed), *sorted(place[id(c)] for c in cameras[n_fixed:])],
@@ -217,7 +220,7 @@ def _joined(
         )
         for count, cameras in sorted(route.by_count.items())
     }
-    return candidates.joined(tuple(passed.values())), by_count
+    return candidates.joined(tuple(passed)), by_count
 
 
 def cover_of(

@@ -6,13 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.devices import PinholeModel
-from planning.cameras.baselines.baseline_limits import BaselineLimits
+from planning.cameras.baselines.baseline_limits import BaselineLimits, RingsOnSurface
 from planning.cameras.baselines.seams import SampledSurface
 from planning.cameras.baselines.widest_baselines import WidestBaselines
 from planning.model.planned import PlannedCamera
+from planning.proofs.quotas import Quotas
 
-_Array = NDArray[np.float64]
 _Measured = NDArray[np.bool_]
 Cameras = tuple[PlannedCamera, ...]
 
@@ -23,31 +22,39 @@ class RouteProblem:
 
     Attributes:
         surface: Lit samples.
-        measure: Which camera measures which sample, but for each other's bodies.
-        together: The same with all their bodies in place; nothing where they don't fit.
-        stand: Cameras in directions (k, 3) from the centre, where they may stand.
-        widen: Maximises the baselines of cameras to the limit (10), losing nothing.
-        device: Optics of a camera.
-        ring_radius: Distance from the centre at which cameras stand [m].
         limits: What binds a camera.
-        required: Samples that must be measured.
-        fixed: Existing cameras.
+        offered: Cameras to begin with, existing ones first.
+        alone: Which of them measures which sample, but for each other's bodies, (n, m).
+        together: Which camera measures which sample with all their bodies in place,
+            (n, k); nothing where they don't fit.
+        widen: Maximises the baselines of cameras to the limit (10), losing nothing.
+        quotas: What must be measured, of all samples and of regions.
+        n_fixed: Existing cameras.
+        rings: Rings of each projector on the samples; None: no rings.
     """
 
     surface: SampledSurface
-    measure: Callable[[Sequence[PlannedCamera]], _Measured]
-    together: Callable[[Sequence[PlannedCamera]], _Measured]
-    stand: Callable[[_Array], Cameras]
-    widen: Callable[[Sequence[PlannedCamera]], WidestBaselines]
-    device: PinholeModel
-    ring_radius: float
     limits: BaselineLimits
-    required: int
-    fixed: Cameras = ()
+    offered: Cameras
+    alone: _Measured
+    together: Callable[[Sequence[PlannedCamera]], _Measured]
+    widen: Callable[[Sequence[PlannedCamera]], WidestBaselines]
+    quotas: Quotas
+    n_fixed: int = 0
+    rings: RingsOnSurface | None = None
 
     def placed(self, cameras: Sequence[PlannedCamera]) -> "CameraSet":
         """Return cameras with what they measure among each other's bodies."""
         return CameraSet(tuple(cameras), self.together(cameras))
+
+    def short(self, placed: "CameraSet") -> int:
+        """Return how many samples more must be measured; 0: enough are."""
+        return self.quotas.lacking(placed.covered)
+
+    def wanted(self, placed: "CameraSet") -> _Measured:
+        """Return which samples would bring it nearer to enough, shape (n,)."""
+        missed = self.alone.any(axis=1) & ~placed.covered
+        return missed & self.quotas.wanted(placed.covered)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,9 +65,14 @@ class CameraSet:
     measured: _Measured
 
     @property
+    def covered(self) -> _Measured:
+        """Which samples any of them measures, shape (n,)."""
+        return np.asarray(self.measured.any(axis=1))
+
+    @property
     def count(self) -> int:
         """Samples that any of them measures."""
-        return int(self.measured.any(axis=1).sum())
+        return int(self.covered.sum())
 
     def least_missed(self, n_fixed: int) -> list[int]:
         """Return the cameras that may go, the one that measures least alone first."""

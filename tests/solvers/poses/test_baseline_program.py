@@ -8,6 +8,7 @@ import pytest
 from scipy.optimize import brentq
 from support.closed_forms import round_body_limit
 
+from geometry.poses import look_at
 from planning.cameras.baselines.coverage_triangle import seam_angles
 from solvers.poses.baseline_nlp import build_baseline_program
 from solvers.poses.baseline_problem import (
@@ -33,9 +34,10 @@ NOTHING_KEPT = KeptPoints(
     np.zeros(0, dtype=np.int64),
     np.zeros((0, 3)),
     np.zeros((0, 3)),
-    np.zeros(0),
     np.zeros((0, 3)),
 )
+# No limit of the field: tangents of nearly a right angle.
+WIDE = np.array([[-50.0, -50.0], [50.0, 50.0]])
 
 
 def _on_ring(azimuth, radius=RING):
@@ -50,6 +52,8 @@ def _problem(centres, **changes):
         "shell": PositionShell(np.zeros(3), (RING, RING), Z, np.pi, Z),
         "seams": NO_SEAMS,
         "kept": NOTHING_KEPT,
+        "rolls": np.zeros(len(centres)),
+        "sides": WIDE,
         "max_incidence": THETA,
         "range_m": (0.1, 5.0),
         "min_conditioning": 0.1,
@@ -59,13 +63,12 @@ def _problem(centres, **changes):
     return BaselineProblem(**values)
 
 
-def _kept(camera, points, normals, *, field=-1.0, rings=None):
+def _kept(camera, points, normals, *, rings=None):
     points = np.array(points, dtype=float)
     return KeptPoints(
         np.array(camera, dtype=np.int64),
         points,
         np.array(normals, dtype=float),
-        np.full(len(points), field),
         np.zeros_like(points) if rings is None else np.array(rings, dtype=float),
     )
 
@@ -138,18 +141,26 @@ def test_kept_field_and_conditioning_hold_at_the_answer():
     point, ring = np.array([RADIUS, 0.0, 0.0]), np.array([0.0, -1.0, 0.0])
     start = [_on_ring(-0.2), _on_ring(0.5)]
     rings = [-ring, ring]  # m.r > 0 for both at the start.
-    for field, least in ((np.cos(0.11), 0.1), (-1.0, 0.3)):
-        kept = _kept([0, 1], [point] * 2, [[1, 0, 0]] * 2, field=field, rings=rings)
-        problem = _problem(start, kept=kept, min_conditioning=least)
+    narrow = np.tan(0.11) * np.array([[-1.0, -1.0], [1.0, 1.0]])
+
+    def in_image(centre):
+        local = (point - centre) @ look_at(centre, np.zeros(3), Z)[:3, :3]
+        return np.abs(local[:2] / local[2])
+
+    for sides, least in ((narrow, 0.1), (WIDE, 0.3)):
+        kept = _kept([0, 1], [point] * 2, [[1, 0, 0]] * 2, rings=rings)
+        problem = _problem(start, kept=kept, sides=sides, min_conditioning=least)
         solution = solve_baseline(problem)
         assert solution.status is SolveStatus.LOCALLY_OPTIMAL
         assert solution.smallest_baseline > problem.smallest_baseline
         for centre, m, begin in zip(solution.centres, rings, start, strict=True):
             ray = (point - centre) / np.linalg.norm(point - centre)
             begin_ray = (point - begin) / np.linalg.norm(point - begin)
-            floor = min(field, begin_ray @ -begin / RING)
-            assert ray @ -centre / np.linalg.norm(centre) >= floor - 1e-7
+            widest = np.maximum(sides[1], in_image(begin))
+            np.testing.assert_array_less(in_image(centre), 1.001 * widest)
             assert ray @ m >= min(least, begin_ray @ m) - 1e-7
+    # Without the field the pair is held by conditioning alone, farther apart.
+    assert np.any(in_image(solution.centres[1]) > narrow[1])
 
 
 @pytest.mark.parametrize("limit", ["sigma", "pitch"])

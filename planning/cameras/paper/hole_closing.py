@@ -1,0 +1,100 @@
+"""One camera fewer: which may go, and how the others take over the hole it leaves.
+
+One program over all that may move, centres and aims, restores (10) at the hole
+(`hole_program`). Rays decide: poses count that measure more; the samples that others
+lost are in the next program.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.cameras.baselines.camera_moves import (
+    aims_and_rolls,
+    at_poses,
+    between,
+)
+from planning.cameras.baselines.hole_program import HoleTerms
+
+from .route_problem import CameraSet, RouteProblem
+
+# Cameras that are dropped in turn, with a program each; of those the most promising,
+# and programs for each of these.
+_DROPPED, _PURSUED = 8, 3
+_PROGRAMS = 12
+# How far these move centres and aims, as a share of the largest radius of the shell.
+_REACH, _SHRINK = 0.5, 0.4
+_STEPS = (1.0, 0.5)
+# Programs in a row that measure no more, until it is given up.
+_FAILED = 3
+# A program that measures less than this share of what is missing won't do in the rest.
+_WORTH = 0.2
+
+
+def one_fewer(problem: RouteProblem, placed: CameraSet) -> CameraSet | None:
+    """Return the best of one camera fewer, the hole closed; None where none may go."""
+    tried: list[CameraSet] = []
+    for programs, most in ((1, _DROPPED), (_PROGRAMS, _PURSUED)):
+        begun = tried or [
+            placed.without(i) for i in placed.least_missed(problem.n_fixed)
+        ]
+        tried = []
+        for one in begun[:most]:
+            tried.append(closed(problem, one, programs))
+            if not problem.short(tried[-1]):
+                return tried[-1]
+        tried.sort(key=lambda one: (problem.short(one), -one.count))
+    return tried[0] if tried else None
+
+
+def closed(problem: RouteProblem, placed: CameraSet, programs: int) -> CameraSet:
+    """Move cameras over the hole until enough is measured, or too little helps."""
+    reach = _REACH * problem.limits.workspace.camera_radius_m[1]
+    lost, failed = np.zeros(0, dtype=np.int64), 0
+    for _ in range(programs if len(placed.cameras) > problem.n_fixed else 0):
+        short = problem.short(placed)
+        if not short:
+            break
+        moved, lost = _taken_over(problem, placed, lost, reach)
+        if moved is placed:
+            failed, reach = failed + 1, _SHRINK * reach
+            if failed == _FAILED:
+                break
+        else:
+            worth = short - problem.short(moved) >= _WORTH * short
+            placed, lost = moved, lost[:0]
+            if not worth:
+                break
+    return placed
+
+
+def _taken_over(
+    problem: RouteProblem, placed: CameraSet, lost: NDArray[np.int64], reach: float
+) -> tuple[CameraSet, NDArray[np.int64]]:
+    """Return the cameras that a program moved, or as they stand; and what it lost."""
+    # CasADi is imported where it is used.
+    from solvers.poses.baseline_program import solve_baseline
+
+    space = problem.limits.workspace
+    aims, rolls = aims_and_rolls(
+        placed.cameras, placed.measured, problem.surface.points, space
+    )
+    terms = HoleTerms(
+        placed.cameras,
+        placed.measured,
+        problem.surface,
+        problem.wanted(placed),
+        problem.limits,
+        problem.rings,
+    )
+    solution = solve_baseline(terms.problem(aims, rolls, lost, reach))
+    for share in _STEPS if solution.status.has_point else ():
+        poses = between(
+            placed.cameras, (aims, rolls), solution.centres, solution.aims, share, space
+        )
+        if poses is None:
+            continue
+        moved = problem.placed(at_poses(placed.cameras, poses))
+        if problem.short(moved) < problem.short(placed):
+            return moved, lost
+        lost = np.union1d(lost, np.flatnonzero(placed.covered & ~moved.covered))
+    return placed, lost
