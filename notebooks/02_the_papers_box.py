@@ -145,8 +145,8 @@ draw_densities(outcome.union, both, stage)
 # light and see a third of the box from one side. Planned, two projectors stand before
 # opposite corners and light all six faces, no device is wasted on an overlap. With
 # 8000 px two cameras are too few, and the planner says so; with the lens that fits two
-# measure it all. What is missed then are places between circles: the paper's few
-# do not come within a gap of every point of a slanted face.
+# measure nearly all: a wedge lies on each camera's blind curve, $r \cdot m = 0$, and
+# between few circles some places are more than a ring gap from any point.
 
 # %%
 plans = {}

@@ -159,4 +159,4 @@ def test_what_is_not_known_is_not_claimed(handmade):
     assert (no_rate.t1, no_rate.C, no_rate.C_before) == (None, None, None)
     assert no_rate.t2 is not None
     (line,) = told(no_rate, handmade)
-    assert "doesn't say frame_rate_hz of camera or projector" in line
+    assert "a scan is 22 frames; frame_rate_hz of camera or projector isn't" in line

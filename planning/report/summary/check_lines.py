@@ -59,8 +59,9 @@ def cost_lines(document: PlanDocument) -> list[str]:
     """Return eq. (8) with its terms, for a person."""
     cost = document.cost
     if cost.frame_s is None:
-        unknown = "frame_rate_hz of camera or projector, so eq. (8) has no t1"
-        return labelled("COST", [f"the rig doesn't say {unknown}"])
+        scan = f"a scan is {count_words(cost.n_frames, 'frame')}"
+        unknown = "frame_rate_hz of camera or projector isn't in the rig"
+        return labelled("COST", [f"{scan}; {unknown}, so eq. (8) has no t1"])
     acquired = cost.n_frames * cost.frame_s
     scan = f"{cost.n_frames} frames of {1e3 * cost.frame_s:.1f} ms, {acquired:.2f} s"
     if cost.C is None or cost.t2 is None or cost.t3 is None:
