@@ -158,7 +158,9 @@ def test_a_part_of_the_turn_lets_cameras_go_and_the_rest_slide_to_the_limit():
     route = paper_route(problem)
     assert problem.short(route.cameras) == 0
     first, last = azimuths(route.cameras.cameras)
-    assert 2.0 * (np.radians(100.0) - ETA) < last - first < 2.0 * ETA
+    # Between samples nothing is asked.
+    between = np.radians(200.0 / 149)
+    assert 2.0 * (np.radians(100.0) - ETA) < last - first < 2.0 * ETA + between
     assert 2.0 * np.sin((last - first) / 2) == pytest.approx(
         round_body_limit(RADIUS, RING, THETA).d_max, rel=0.07
     )
