@@ -46,7 +46,8 @@ class CoverSolution:
             Where HiGHS' bound comes within 1e-5 of the cost, it is the cost.
         proof: What proves the bound, and what cut the proof short if anything did.
         total_bound: The part of the bound that ``required_total`` proves without the
-            floors of row sets, where all cost the same.
+            floors of row sets, where all cost the same and each row needs one set; else
+            the bound itself.
     """
 
     problem: CoverProblem

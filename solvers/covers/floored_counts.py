@@ -38,7 +38,8 @@ def fewest_with_floors(
     """
     alone, part = cover.without_floors, budget.part(0.5 * budget.units)
     found = fewest_sets(alone, part, seed=seed, heaviest=False)
-    total_bound = found.bound
+    # Of nothing that is lacking the search takes one set all the same.
+    total_bound = found.bound if alone.required > 0 else 0.0
     if not cover.meets(found.selected):
         selected, prices = _from_above(cover, found.selected, budget, seed)
         found = replace(found, status=SolveStatus.FEASIBLE, selected=selected)

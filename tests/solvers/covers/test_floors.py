@@ -98,6 +98,9 @@ def test_a_floor_costs_a_set_that_the_total_does_not():
     none_allowed = solve_cover(asked, max_sets=2)
     assert none_allowed.status is SolveStatus.INFEASIBLE
     assert none_allowed.shortfall() == 0.5
+    # What stands already is enough for the total, which then takes none.
+    standing = solve_cover(replace(asked, fixed=[0, 1]))
+    assert (standing.lower_bound, standing.total_bound) == (3, 2)
 
 
 def test_a_floor_that_costs_weight_but_no_set_is_met():
