@@ -101,7 +101,7 @@ def draw_redundancy(outcome: Outcome, stage: PanelStage) -> Image.Image:
     ids = [projector.id for projector in outcome.experiment.scanner.projectors]
     panels = [
         stage.panel(
-            f"Removed as redundant: {int(np.sum(~stays))} of {len(stays)}",
+            f"Removed, redundant or at steps: {int(np.sum(~stays))} of {len(stays)}",
             everything.points,
             colours.astype(np.float64),
             [("stays", KEPT), ("removed", REMOVED)],

@@ -125,7 +125,10 @@ def test_the_box_is_measured_to_a_fortieth_of_a_millimetre(of_box):
     assert errors.rms_m < 0.025e-3
     assert abs(errors.bias_m) < 0.003e-3
     assert errors.outliers == 0.0
-    assert of_box.merged.errors.rms_m <= errors.rms_m
+    parts = [one.errors.rms_m for one in of_box.clouds[:4]]
+    assert of_box.merged.errors.rms_m < 0.6 * min(parts)
+    assert of_box.merged.complete[1] == of_box.union.complete[1]
+    assert of_box.merged.complete[0] > of_box.union.complete[0] - 1e-3
     by_name = {one.name: one for one in of_box.clouds}
     assert list(by_name) == [
         "P1 with C1",
@@ -137,9 +140,11 @@ def test_the_box_is_measured_to_a_fortieth_of_a_millimetre(of_box):
     shares = [one.complete[0] for one in of_box.clouds[:4]]
     assert shares[0] < min(shares[1:3])
     assert max(shares[1:3]) < shares[3] == max(shares)
-    assert 0.3 < of_box.reconstruction.redundant_fraction < 0.7
+    assert 0.05 < of_box.reconstruction.redundant_fraction < 0.5
     kept = of_box.union.cloud.take(of_box.reconstruction.merged.stays).points
-    assert {tuple(p) for p in kept} == {tuple(p) for p in of_box.merged.cloud.points}
+    # Points that stay were moved along their light by what noise had done.
+    moved = np.linalg.norm(kept - of_box.merged.cloud.points, axis=1)
+    assert 0.0 < np.sqrt(np.mean(moved**2)) < 2.0 * errors.rms_m
     # Both sides of the box's edge, up to the outermost ring of either projector.
     assert by_name["all points"].complete[1] > 0.99
 
@@ -256,7 +261,7 @@ def on_plate(radii: np.ndarray) -> Cloud:
     index = np.zeros(n, dtype=np.int16)
     return Cloud(
         points, points, points, points[:, :2], index, index,
-        ring.astype(np.int16), one, points, one,
+        ring.astype(np.int16), one, points, one, one,
     )  # fmt: skip
 
 

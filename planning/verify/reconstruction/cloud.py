@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from .arrays import Array, Columns
 
 # Shift of edges by texture under the blur of a lens [px], error of a normal [rad].
-_TEXTURE_PX, _NORMAL_RAD = 0.015, 0.1
+TEXTURE_PX, _NORMAL_RAD = 0.015, 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +27,7 @@ class Cloud(Columns):
         shift: Displacement of the point when its edge moves by one pixel across itself,
             in [m/px], shape (n, 3).
         noise_px: Standard deviation of the edge's position across itself [px], (n,).
+        blur_px: That of the edge's blur [px]; NaN: unknown, shape (n,).
     """
 
     points: Array
@@ -39,6 +40,7 @@ class Cloud(Columns):
     conditioning: Array
     shift: Array
     noise_px: Array
+    blur_px: Array
 
     def of_devices(self, projector: int, camera: int) -> "Cloud":
         """Return the points with these indices of their devices."""
@@ -62,14 +64,12 @@ class Cloud(Columns):
         """
         along = np.einsum("ij,ij->i", self.shift, normals)
         astray = _NORMAL_RAD * np.linalg.norm(self.shift, axis=1)
-        return np.hypot(along, astray) * np.hypot(self.noise_px, _TEXTURE_PX)
+        return np.hypot(along, astray) * np.hypot(self.noise_px, TEXTURE_PX)
 
     @staticmethod
     def empty() -> "Cloud":
         """Return a cloud of no points."""
         vectors, numbers = np.zeros((0, 3)), np.zeros(0)
         pixels, index = np.zeros((0, 2)), np.zeros(0, dtype=np.int16)
-        devices = index, index, index
-        return Cloud(
-            vectors, vectors, vectors, pixels, *devices, numbers, vectors, numbers
-        )
+        places, devices = (vectors, vectors, vectors, pixels), (index, index, index)
+        return Cloud(*places, *devices, numbers, vectors, numbers, numbers)

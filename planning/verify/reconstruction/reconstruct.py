@@ -12,6 +12,7 @@ from planning.verify.reconstruction.check.accuracy import (
     measure_completeness,
 )
 from planning.verify.reconstruction.check.merge import merge
+from planning.verify.reconstruction.check.overlaps import pixel_sizes
 from planning.verify.reconstruction.check.result import PairCount, Reconstruction
 from planning.verify.reconstruction.decode.decode import Pairs
 from planning.verify.reconstruction.faults.causes import explained
@@ -165,9 +166,9 @@ def conclude(
     expected = expected.within(plan.target)
     spent = spent or Spent()
     everything = Cloud.join([pair.cloud.of_devices(p, c) for (p, c), pair in decoded])
-    gap_m, pitch_px = _ring_gap(plan, everything)
     with spent.on("merge"):
-        merged = merge(everything, gap_m=gap_m, pitch_px=pitch_px)
+        lit = {pair: gave.lit for pair, gave in decoded}
+        merged = merge(everything, plan, lit, pitch_px=_ring_pitch(plan, everything))
     limits = plan.limits.check
     completeness = measure_completeness(
         everything, merged.cloud, expected, limits.tau_m
@@ -195,17 +196,13 @@ def conclude(
     )
 
 
-def _ring_gap(plan: Scanner, cloud: Cloud) -> tuple[float, float]:
-    """Median distance of neighbouring rings, across the beam [m] and in images [px]."""
+def _ring_pitch(plan: Scanner, cloud: Cloud) -> float:
+    """Median distance of neighbouring rings in images [px]."""
     if len(cloud) == 0:
-        return plan.limits.check.tau_m, 1.0
+        return 1.0
     gaps = np.empty(len(cloud))
     for p, projector in enumerate(plan.projectors):
         chosen = cloud.projector == p
         rings, depth = cloud.ring[chosen], projector.to_ring(cloud.points[chosen])[:, 2]
         gaps[chosen] = projector.pattern.gaps_m(rings, depth)
-    centres = np.array([camera.centre for camera in plan.cameras])
-    focal = np.array([camera.focal_px for camera in plan.cameras])
-    reach = np.linalg.norm(cloud.points - centres[cloud.camera], axis=1)
-    pitch = gaps * focal[cloud.camera] / reach
-    return float(np.median(gaps)), float(np.median(pitch))
+    return float(np.median(gaps / pixel_sizes(cloud, plan)))

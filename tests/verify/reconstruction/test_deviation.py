@@ -85,9 +85,14 @@ def plate_map(limits_m=None, align="none"):
         Cloud.empty(), points=points, noise_px=np.ones(n), shift=np.zeros((n, 3))
     )
     up = np.tile([0.0, 0.0, 1.0], (n, 1))
-    merged = Merged(cloud, np.ones(n, dtype=bool), up, np.full(n, 1e-5))
+    merged = merged_as(cloud, up)
     scanner = replace(BLANK, mesh=plate, region=np.array([0, 0, -1, -1]))
     return measure_deviation(merged, scanner, align, limits_m)
+
+
+def merged_as(cloud: Cloud, normals: np.ndarray) -> Merged:
+    every, none = np.ones(len(cloud), dtype=bool), np.zeros(len(cloud), dtype=bool)
+    return Merged(cloud, every, none, none, normals, np.full(len(cloud), 1e-5))
 
 
 class _Limits:
@@ -139,7 +144,7 @@ def test_what_the_fit_did_is_told_and_points_and_normals_went_along(waved):
         Cloud.empty(), points=points, noise_px=np.ones(n), shift=np.zeros((n, 3))
     )
     normals = found.normals @ moved[:3, :3].T
-    merged = Merged(cloud, np.ones(n, dtype=bool), normals, np.full(n, 1e-5))
+    merged = merged_as(cloud, normals)
     scanner = replace(BLANK, mesh=waved, region=np.zeros(len(waved.faces), int))
     fit = measure_deviation(merged, scanner, "best-fit")
     back = found.points.mean(axis=0) - points.mean(axis=0)

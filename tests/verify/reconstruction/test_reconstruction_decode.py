@@ -115,7 +115,7 @@ def test_noise_of_edges_is_what_the_decoder_says_it_is(rigs):
     frames, patterns, calibration = shot(
         rigs, "diverging", 3478.0, Photometry(albedo_variation=0.0)
     )
-    edges, lit, _ = find_edges(frames, patterns)
+    edges, _, lit, _ = find_edges(frames, patterns)
     error = edge_error_px(edges, patterns, calibration)
     assert frames.stack.dtype == np.uint8
     assert lit > 0.5 * frames.stack[0].size

@@ -1,105 +1,201 @@
-"""Redundancy removed from hand-made clouds: which points stay."""
+"""Clouds of plates merged: what stays, what goes at a step, and how sure it is."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
+from support import reconstruction_rigs as rigs
 
-from planning.verify.reconstruction.check.merge import merge
+from geometry.mesh.mesh import TriangleMesh
+from planning.verify.reconstruction.check.merge import Merged, merge
 from planning.verify.reconstruction.cloud import Cloud
+from planning.verify.reconstruction.decode.decode import Pairs
+from planning.verify.reconstruction.decode.lit_image import LitImage
+from planning.verify.reconstruction.render.photometry import Photometry
+from planning.verify.reconstruction.render.rendered import Spent, decode_rendered
+from planning.verify.reconstruction.scanner import Scanner
 
-GAP_M, PITCH_PX = 3.5e-3, 12.0
-
-
-def sheet(
-    *,
-    camera: int = 0,
-    projector: int = 0,
-    z: float = 0.0,
-    facing: float = 1.0,
-    beam: tuple[float, float, float] = (0.0, 0.0, -1.0),
-    noise_px: float = 0.02,
-    width: int = 20,
-) -> Cloud:
-    """Rings a gap apart on a plane of constant z, seen square from above or below."""
-    ring, along = (k.ravel() for k in np.meshgrid(np.arange(width), np.arange(200)))
-    x, y = ring * GAP_M + 0.4e-3 * camera, along * 0.3e-3
-    n = len(x)
-    ray = np.array([0.0, 0.0, -facing])
-    beam_direction = np.array(beam) / np.linalg.norm(beam)
-    return Cloud(
-        points=np.column_stack([x, y, np.full(n, z)]),
-        rays=np.tile(ray, (n, 1)),
-        beams=np.tile(beam_direction, (n, 1)),
-        pixels=np.column_stack([x, y]) / 0.29e-3 + 100.0,
-        camera=np.full(n, camera, np.int16),
-        projector=np.full(n, projector, np.int16),
-        ring=ring.astype(np.int16),
-        conditioning=np.full(n, 0.4),
-        shift=np.tile([1e-4, 0.0, 3e-4], (n, 1)),
-        noise_px=np.full(n, noise_px),
-    )
+WIDE, TALL, HEIGHT = 0.035, 0.030, 0.02
+GAP = 12e-3
+PITCH_PX = GAP * 3478.0
 
 
-def merged(*clouds: Cloud):
-    return merge(Cloud.join(clouds), gap_m=GAP_M, pitch_px=PITCH_PX)
-
-
-def test_normals_point_to_the_camera_and_sigma_is_along_them():
-    result = merged(sheet(noise_px=0.05))
-    assert len(result.cloud) == 4000
-    np.testing.assert_allclose(result.normals, [[0.0, 0.0, 1.0]] * 4000, atol=1e-9)
-    # Along the normal, a tenth of the whole for the normal's error; texture's shift.
-    shift = np.hypot(3e-4, 0.1 * np.hypot(1e-4, 3e-4))
-    np.testing.assert_allclose(result.sigma, shift * np.hypot(0.05, 0.015))
-
-
-@pytest.mark.parametrize("squarer", [0, 1])
-def test_the_squarer_projector_stays_though_its_edges_are_noisier(squarer):
-    clouds = [
-        sheet(
-            projector=p,
-            beam=(0.2, 0.0, -1.0) if p == squarer else (1.0, 0.0, -1.0),
-            noise_px=0.1 if p == squarer else 0.01,
-        )
-        for p in (0, 1)
+def plates(*edges: tuple[float, float, float]) -> TriangleMesh:
+    """Rectangles from x to x at y, that face the rig."""
+    corners = [
+        [[a, y, -TALL], [b, y, -TALL], [b, y, TALL], [a, y, TALL]] for a, b, y in edges
     ]
-    result = merged(*clouds)
-    assert len(result.cloud) == 4000
-    assert np.all(result.cloud.projector == squarer)
+    faces = [[[4 * k, 4 * k + 1, 4 * k + 2], [4 * k, 4 * k + 2, 4 * k + 3]]
+             for k in range(len(edges))]  # fmt: skip
+    return TriangleMesh(np.concatenate(corners), np.concatenate(faces))
 
 
-def test_a_projector_that_measured_little_gives_way():
-    """Squarer, but with one point in eight of the other's: too few to stand for it."""
-    few = sheet(projector=1).take(np.arange(0, 4000, 8))
-    many = sheet(projector=0, beam=(0.6, 0.0, -1.0))
-    result = merged(many, few)
-    assert np.count_nonzero(result.cloud.projector == 0) == 4000
-    assert np.count_nonzero(result.cloud.projector == 1) == 0
+FLAT = plates((-WIDE, WIDE, 0.0))
+STEP = plates((-WIDE, 0.0, -HEIGHT), (-WIDE, WIDE, 0.0))
 
 
-@pytest.mark.parametrize("sharper", [0, 1])
-def test_of_two_cameras_the_smaller_sigma_stays(sharper):
-    clouds = [sheet(camera=c, noise_px=0.02 if c == sharper else 0.03) for c in (0, 1)]
-    result = merged(*clouds)
-    assert np.mean(result.cloud.camera == sharper) > 0.75
-    assert len(result.cloud) < 6000
+def scanner_of(mesh: TriangleMesh) -> Scanner:
+    """Two parallel projectors of few rings, and two small cameras."""
+    cameras = rigs.two_small_cameras()
+    for entry in cameras:
+        entry["K"] = [[3478.0, 0.0, 159.5], [0.0, 3478.0, 119.5], [0.0, 0.0, 1.0]]
+    projectors = [
+        rigs.parallel(name, rigs.direction(azimuth, 5.0), 1.05 * mesh.radius, GAP)
+        for name, azimuth in (("P1", -20.0), ("P2", 20.0))
+    ]
+    return Scanner.of(rigs.plan_of(mesh, projectors, cameras))
 
 
-def test_both_sides_of_a_thin_sheet_stay():
-    front = sheet(camera=0, z=0.0)
-    back = sheet(camera=1, z=-0.4e-3, facing=-1.0, beam=(0.0, 0.0, 1.0), noise_px=0.1)
-    result = merged(front, back)
-    assert np.count_nonzero(result.cloud.camera == 0) == 4000
-    assert np.count_nonzero(result.cloud.camera == 1) == 4000
+def decoded(mesh: TriangleMesh, albedo: float) -> Pairs:
+    plan = scanner_of(mesh)
+    light = Photometry(albedo_variation=albedo)
+    return decode_rendered(plan, plan, light, seed=0, threads=1, spent=Spent())
 
 
-def test_lonely_points_have_no_normal_and_stay():
-    few = sheet().take(np.arange(0, 4000, 1999))
-    result = merged(few)
-    assert len(result.cloud) == len(few) == 3
-    assert np.all(np.isnan(result.normals))
-    assert np.all(np.isnan(result.sigma))
+def joined(pairs: Pairs) -> Cloud:
+    return Cloud.join([pair.cloud.of_devices(*key) for key, pair in pairs])
+
+
+def merged(pairs: Pairs, mesh: TriangleMesh) -> Merged:
+    lit = {key: pair.lit for key, pair in pairs}
+    cloud = joined(pairs)
+    return merge(cloud, scanner_of(mesh), lit, pitch_px=PITCH_PX)
+
+
+def off_step(cloud: Cloud) -> np.ndarray:
+    """Distance from the nearer plate; the face of the step itself isn't there."""
+    x, y, _ = cloud.points.T
+    high = np.where(x < 0.5e-3, np.abs(y + HEIGHT), np.inf)
+    return np.minimum(np.abs(y), high)
+
+
+@pytest.fixture(scope="module")
+def flat() -> Pairs:
+    return decoded(FLAT, 0.0)
+
+
+@pytest.fixture(scope="module")
+def stepped() -> Pairs:
+    return decoded(STEP, 0.0)
+
+
+def test_false_points_at_a_step_go_or_are_known_to_be_unsure(stepped):
+    found = merged(stepped, STEP)
+    before, after = off_step(joined(stepped)), off_step(found.cloud)
+    assert np.count_nonzero(before > 0.3e-3) > 300
+    wrong = after > 0.3e-3
+    assert np.count_nonzero(wrong) < 80
+    assert np.mean(after[wrong] < 4.0 * found.sigma[wrong]) > 0.9
+    # The right ones aren't taken for wrong.
+    assert np.mean(found.steps[before < 0.1e-3]) < 0.02
+    assert np.mean(found.sigma[~wrong] < 0.1e-3) > 0.95
+    assert np.sqrt(np.mean(after**2)) < 0.5 * np.sqrt(np.mean(before**2))
+
+
+def test_the_mesh_is_not_looked_at(stepped):
+    """Merged about another object it is the same cloud."""
+    one, other = merged(stepped, STEP), merged(stepped, FLAT)
+    np.testing.assert_array_equal(one.cloud.points, other.cloud.points)
+
+
+def test_a_merged_plane_is_better_than_any_of_its_parts(flat):
+    cloud, found = joined(flat), merged(flat, FLAT)
+    error = np.abs(cloud.points[:, 1])
+    parts = [
+        np.sqrt(np.mean(error[(cloud.projector == p) & (cloud.camera == c)] ** 2))
+        for p in (0, 1)
+        for c in (0, 1)
+    ]
+    after = np.abs(found.cloud.points[:, 1])
+    assert np.sqrt(np.mean(after**2)) < 0.75 * min(parts)
+    known = np.isfinite(found.sigma)
+    assert known.mean() > 0.9
+    assert 0.4 < np.sqrt(np.mean((after / found.sigma)[known] ** 2)) < 1.6
+    np.testing.assert_allclose(found.normals[known, 1], -1.0, atol=0.02)
+    assert not found.steps.any()
+
+
+def test_two_sparse_ring_sets_on_a_plane_lose_nothing_of_completeness(flat):
+    """At half a gap, one and two, on a lattice finer than the merging."""
+    cloud, found = joined(flat), merged(flat, FLAT)
+    assert 0.05 < np.mean(~found.stays) < 0.6
+    x, z = np.meshgrid(np.linspace(-WIDE, WIDE, 141), np.linspace(-TALL, TALL, 121))
+    lattice = np.column_stack([x.ravel(), np.zeros(x.size), z.ravel()])
+    before, after = (
+        KDTree(points).query(lattice)[0]
+        for points in (cloud.points, found.cloud.points)
+    )
+    for gaps in (0.5, 1.0, 2.0):
+        near = before <= gaps * GAP
+        # Copies of a point lie up to a pixel and a half beside each other.
+        assert np.all(after[near] <= gaps * GAP + 0.3e-3)
+        assert np.mean(near) - np.mean(after <= gaps * GAP) < 6e-4
+    gone = cloud.points[~found.stays]
+    assert KDTree(found.cloud.points).query(gone)[0].max() < 0.9e-3
+    # Both projectors' rings stay: they fell on different places.
+    kept = np.bincount(found.cloud.projector) / np.bincount(cloud.projector)
+    assert kept.min() > 0.4
+
+
+def test_texture_does_not_change_which_pixels_overlap(flat):
+    textured = decoded(FLAT, 0.5)
+    for pairs in (flat, textured):
+        assert merged(pairs, FLAT).shared.mean() > 0.99
+    for c in (0, 1):
+        plain, rough = (
+            np.minimum(*(pair.lit.shown > 0 for (_, k), pair in pairs if k == c))
+            for pairs in (flat, textured)
+        )
+        assert plain.mean() > 0.3
+        assert np.mean(plain == rough) > 0.995
+
+
+def test_light_of_one_projector_is_no_overlap(flat):
+    """Without the other's images a point is judged by its own ring alone."""
+    alone = [(key, pair) for key, pair in flat if key[0] == 0]
+    assert not merged(alone, FLAT).shared.any()
+
+
+def test_a_point_that_is_not_where_the_other_projectors_code_puts_it_goes(flat):
+    """Moved along its viewing ray by three gaps it lies on another annulus."""
+    moved = [
+        (key, replace(pair, cloud=_moved(pair.cloud) if key == (0, 0) else pair.cloud))
+        for key, pair in flat
+    ]
+    found, cloud = merged(moved, FLAT), joined(moved)
+    strayed = np.abs(cloud.points[:, 1]) > GAP
+    assert np.count_nonzero(strayed) == 20
+    assert np.all(found.steps[strayed])
+    assert np.mean(found.steps[~strayed]) < 0.01
+
+
+def _moved(cloud: Cloud) -> Cloud:
+    away = np.zeros(len(cloud))
+    away[np.linspace(0, len(cloud) - 1, 20).astype(int)] = 6.0 * GAP
+    return replace(cloud, points=cloud.points + away[:, None] * cloud.rays)
+
+
+def test_doubt_of_a_pair_is_not_averaged_away(flat):
+    def unsure(cloud: Cloud) -> Cloud:
+        return replace(cloud, noise_px=np.full(len(cloud), 0.8))
+
+    doubted = [(key, replace(pair, cloud=unsure(pair.cloud))) for key, pair in flat]
+    assert np.all(merged(doubted, FLAT).cloud.noise_px == 0.8)
+
+
+def test_annuli_about_a_pixel():
+    index = np.full((6, 8), 3, np.int16)
+    index[:, 4:] = 4
+    index[0] = -1
+    lit = LitImage.of(index, (10, 20))
+    places = np.array([[12, 23], [13, 23], [14.4, 23.0], [13, 21], [13, 20], [30, 3.0]])
+    low, high = lit.around(places)
+    assert low.tolist() == [3, 3, 3, 3, -1, -1]
+    assert high.tolist() == [3, 4, 4, 4, -1, -1]
+    assert LitImage.of(np.full((4, 4), 300, np.int16), (0, 0)).shown.max() == 301
 
 
 def test_nothing_merges_to_nothing():
-    result = merged(Cloud.empty())
-    assert len(result.cloud) == len(result.sigma) == 0
+    found = merge(Cloud.empty(), scanner_of(FLAT), {}, pitch_px=1.0)
+    assert len(found.cloud) == len(found.sigma) == len(found.stays) == 0

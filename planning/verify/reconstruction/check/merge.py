@@ -1,26 +1,41 @@
 """Many overlapping clouds to one: eqs. (5)-(7), from what was measured alone.
 
-Poses are known, so that the clouds are in one frame already. Where several projectors
-light a piece of surface, the one that meets it more squarely stays, then among cameras
-the one with the smaller standard deviation along the normal.
+Poses are known, so that the clouds are in one frame already. Where clouds overlap is
+found from the light in the images, and confirmed by geometry: a camera's pixel shows
+one point, and a ray of light lights one. Points at steps that others contradict, or
+that nothing confirms, go; what several cameras measured of a ring is one curve.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from planning.verify.reconstruction.arrays import Array, Indices, Mask
 from planning.verify.reconstruction.cloud import Cloud
+from planning.verify.reconstruction.decode.decode import PairIndex
+from planning.verify.reconstruction.decode.lit_image import LitImage
+from planning.verify.reconstruction.scanner import Scanner
 
-# Edges are compared within tiles of the image about one ring pitch wide.
+from .overlaps import compare_overlaps, pixel_sizes
+from .ring_curves import RingCurves
+
+# Normals are of planes within tiles of the image about one ring pitch wide.
 _MIN_TILE_PX, _MAX_TILE_PX = 6, 64
 _MIN_POINTS = 12
 # A plane is one if the points spread in two directions, at most this unevenly.
 _MIN_SPREAD = 0.02
-# A projector may stand for another in a tile if it measured this share as many points.
-_MIN_SUPPORT = 0.4
-# Directions that a surface may face, and one for surface whose direction isn't known.
-_SIDES = 7
+# From here on it isn't noise but doubt of a pair, which no average makes less [px].
+_DOUBT_PX = 0.5
+# Points of two projectors are of one spot in a cell so large [px].
+_SPOT_PX = 1.5
+# In cells of this share of a ring's pitch those go whose sigma is so many times that of
+# another projector: their rings fell on other places, but hardly measure them.
+_PLACE, _MUCH_WORSE = 0.5, 4.0
+# The projector blurs the edges that it draws, but not steps. Edges are taken for steps
+# below these shares of a pair's median blur: if no other camera confirms them; if an
+# edge of another projector lies there, too; if another camera contradicts them.
+_SHARP, _CROSSED, _CONTRADICTED = 0.5, 0.75, 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,35 +43,101 @@ class Merged:
     """One cloud without redundancy.
 
     Attributes:
-        cloud: The points that stay.
+        cloud: The points that stay, moved onto the curves that all cameras measured.
         stays: Which of all points these are, shape (n_all,).
+        steps: Which are left out as edges between surfaces, shape (n_all,).
+        shared: Which lie where two projectors' light shows, shape (n_all,).
         normals: By the points around, towards the camera; NaN: too few, shape (n, 3).
         sigma: Standard deviation of each point along its normal [m]; NaN likewise.
     """
 
     cloud: Cloud
     stays: Mask
+    steps: Mask
+    shared: Mask
     normals: Array
     sigma: Array
 
 
-def merge(cloud: Cloud, *, gap_m: float, pitch_px: float) -> Merged:
-    """Remove redundant points, of rings so far apart on the object and in images."""
-    side = int(np.clip(np.ceil(pitch_px), _MIN_TILE_PX, _MAX_TILE_PX))
+def merge(
+    cloud: Cloud, plan: Scanner, lit: Mapping[PairIndex, LitImage], *, pitch_px: float
+) -> Merged:
+    """Remove false and redundant points, and average what remains along its rings.
+
+    Args:
+        cloud: Of all pairs.
+        plan: Whose devices measured it; the object isn't looked at.
+        lit: What each pair's images show.
+        pitch_px: About how far rings are apart in images.
+    """
+    shared, crossed, differs = compare_overlaps(cloud, plan, lit)
+    curves = RingCurves.of(cloud, plan)
+    confirmed, contradicted = curves.evidence()
+    sharpness = _sharpness(cloud)
+    steps = differs | (~confirmed & (sharpness < _SHARP))
+    steps |= crossed & (sharpness < _CROSSED)
+    steps |= contradicted & (sharpness < _CONTRADICTED)
+    doubtful = ~confirmed & (sharpness < _CROSSED)
+
+    shift, remaining, redundant = curves.only(~steps).fitted()
+    # A step lies anywhere between two rings; and what a pair is off by stays.
+    noise_px = np.where(doubtful, pitch_px / np.sqrt(12.0), cloud.noise_px)
+    certain = ~doubtful & (noise_px < _DOUBT_PX)
+    fitted = replace(
+        cloud,
+        points=cloud.points + shift[:, None] * cloud.beams,
+        noise_px=noise_px * np.where(certain, remaining, 1.0),
+    )
     normals = np.full((len(cloud), 3), np.nan)
-    square = np.zeros(len(cloud), dtype=bool)
+    side = int(np.clip(np.ceil(pitch_px), _MIN_TILE_PX, _MAX_TILE_PX))
+    for camera in np.unique(cloud.camera[~steps]):
+        seen = np.flatnonzero((cloud.camera == camera) & ~steps)
+        by_camera = fitted.take(seen)
+        normals[seen] = _plane_normals(by_camera, _Tiles.of(by_camera.pixels, side))
+    # In a step there is no surface whose normal would make an error less.
+    largest = np.linalg.norm(fitted.shift, axis=1) * fitted.noise_px
+    sigma = np.where(doubtful, largest, fitted.sigma(normals))
+
+    stays = ~(steps | redundant)
+    for side_px, ratio in (_SPOT_PX, 1.0), (_PLACE * pitch_px, _MUCH_WORSE):
+        both = np.flatnonzero(stays & shared)
+        overlap = fitted.take(both)
+        cell_m = (
+            side_px * float(np.median(pixel_sizes(overlap, plan))) if len(both) else 1.0
+        )
+        stays[both] = _good_projectors(overlap, sigma[both], cell_m, ratio)
+    return Merged(
+        fitted.take(stays), stays, steps, shared, normals[stays], sigma[stays]
+    )
+
+
+def _sharpness(cloud: Cloud) -> Array:
+    """Blur of each edge as a share of the median of its pair; NaN: unknown, (n,)."""
+    sharpness = np.full(len(cloud), np.nan)
     for camera in np.unique(cloud.camera):
-        seen = np.flatnonzero(cloud.camera == camera)
-        by_camera = cloud.take(seen)
-        tiles = _Tiles.of(by_camera.pixels, side)
-        normals[seen] = _plane_normals(by_camera, tiles)
-        square[seen] = _squarest_projector(by_camera, tiles, normals[seen])
-    squarest, normals = cloud.take(square), normals[square]
-    sigma = squarest.sigma(normals)
-    best = _sharpest_camera(squarest, sigma, _side(normals), 0.5 * gap_m)
-    stays = square.copy()
-    stays[square] = best
-    return Merged(squarest.take(best), stays, normals[best], sigma[best])
+        for projector in np.unique(cloud.projector):
+            pair = (cloud.camera == camera) & (cloud.projector == projector)
+            if np.isfinite(cloud.blur_px[pair]).any():
+                usual = np.nanmedian(cloud.blur_px[pair])
+                sharpness[pair] = cloud.blur_px[pair] / usual
+    return sharpness
+
+
+def _good_projectors(cloud: Cloud, sigma: Array, cell_m: float, ratio: float) -> Mask:
+    """Points of the best projector in each cell of a camera, or about as sure, (n,)."""
+    if len(cloud) == 0:
+        return np.zeros(0, dtype=bool)
+    x, y, z = np.floor((cloud.points - cloud.points.min(axis=0)) / cell_m).T
+    key = (x * (y.max() + 1.0) + y) * (z.max() + 1.0) + z
+    key = key * (cloud.camera.max() + 1.0) + cloud.camera
+    # Without a normal a point gives way to any other.
+    known = np.where(np.isfinite(sigma), sigma, np.inf)
+    order = np.lexsort((known, key))
+    first = np.flatnonzero(np.diff(key[order], prepend=-1.0))
+    best = np.empty(len(cloud), dtype=np.int64)
+    best[order] = np.repeat(order[first], np.diff(first, append=len(order)))
+    good = cloud.projector == cloud.projector[best]
+    return good | ((ratio > 1.0) & (known <= ratio * known[best]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,11 +153,6 @@ class _Tiles:
         place = np.floor((pixels - pixels.min(axis=0)) / side).astype(np.int64) + 1
         columns, rows = (place.max(axis=0) + 2).tolist()
         return cls(place[:, 1] * columns + place[:, 0], (rows, columns))
-
-    def occupied(self, chosen: Mask) -> Mask:
-        """Return whether each tile holds one of the chosen points, (n_tiles,)."""
-        rows, columns = self.shape
-        return np.bincount(self.of_point[chosen], minlength=rows * columns) > 0
 
     def sum_around(self, values: Array | None = None) -> Array:
         """Return sums over each tile and its eight neighbours, (n_tiles,)."""
@@ -105,56 +181,3 @@ def _plane_normals(cloud: Cloud, tiles: _Tiles) -> Array:
     normals = np.where(flat[:, None], vectors[:, :, 0], np.nan)[tiles.of_point]
     away = np.einsum("ij,ij->i", normals, cloud.rays) > 0.0
     return np.where(away[:, None], -normals, normals)
-
-
-def _squarest_projector(cloud: Cloud, tiles: _Tiles, normals: Array) -> Mask:
-    """Points of the projector that meets each tile most squarely, shape (n,)."""
-    projectors = np.unique(cloud.projector)
-    if len(projectors) < 2:
-        return np.ones(len(cloud), dtype=bool)
-    cosine = -np.einsum("ij,ij->i", cloud.beams, normals)
-    known = np.isfinite(cosine)
-    score, support = [], []
-    for projector in projectors:
-        lit = cloud.projector == projector
-        count = tiles.sum_around(lit.astype(np.float64))
-        count[~tiles.occupied(lit)] = 0.0
-        weighed = tiles.sum_around((lit & known).astype(np.float64))
-        total = tiles.sum_around(np.where(lit & known, cosine, 0.0))
-        score.append(total / np.maximum(weighed, 1.0))
-        support.append(count)
-    scores, counts = np.array(score), np.array(support)
-    able = counts >= _MIN_SUPPORT * counts.max(axis=0)
-    winner = projectors[np.argmax(np.where(able, scores, -np.inf), axis=0)]
-    return ~known | (cloud.projector == winner[tiles.of_point])
-
-
-def _side(normals: Array) -> Indices:
-    """Which of the six directions of the axes each normal is nearest to; 6 for none."""
-    known = np.isfinite(normals[:, 0])
-    steepest = np.argmax(np.abs(np.where(known[:, None], normals, 0.0)), axis=1)
-    sign = np.take_along_axis(normals, steepest[:, None], axis=1)[:, 0] > 0.0
-    return np.where(known, 2 * steepest + sign, _SIDES - 1)
-
-
-def _sharpest_camera(cloud: Cloud, sigma: Array, side: Indices, cell_m: float) -> Mask:
-    """Points of the camera with the least mean sigma in each cell of space, (n,)."""
-    if len(cloud) == 0:
-        return np.zeros(0, dtype=bool)
-    place = np.floor((cloud.points - cloud.points.min(axis=0)) / cell_m).astype(
-        np.int64
-    )
-    rows, columns = place[:, 1].max() + 1, place[:, 2].max() + 1
-    key = (place[:, 0] * rows + place[:, 1]) * columns + place[:, 2]
-    # Surface that faces another way is the other side of something thin.
-    key = key * _SIDES + side
-    _, cell = np.unique(key, return_inverse=True)
-    cameras = int(cloud.camera.max()) + 1
-    slot = cell * cameras + cloud.camera
-    n_slots = (int(cell.max()) + 1) * cameras
-    # Without a normal a point gives way to any other.
-    known = np.where(np.isfinite(sigma), sigma, 1.0)
-    count = np.bincount(slot, minlength=n_slots)
-    mean = np.bincount(slot, known, n_slots) / np.maximum(count, 1)
-    mean = np.where(count > 0, mean, np.inf).reshape(-1, cameras)
-    return cloud.camera == np.argmin(mean, axis=1)[cell]

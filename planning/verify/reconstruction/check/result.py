@@ -86,8 +86,13 @@ class Reconstruction:
 
     @property
     def redundant_fraction(self) -> float:
-        """Share of the points that was removed as redundant."""
+        """Share of the points that merging removed, redundant or false."""
         return 1.0 - self.n_merged / self.n_points if self.n_points else 0.0
+
+    @property
+    def step_fraction(self) -> float:
+        """Share of the points that were left out as edges between surfaces."""
+        return float(self.merged.steps.mean()) if self.n_points else 0.0
 
     def record(self) -> ReconstructionRecord:
         """Return the `reconstruction` part of a plan."""

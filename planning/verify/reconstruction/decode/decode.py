@@ -11,6 +11,7 @@ from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
 
 from .edges import SATURATED, ImageEdges, find_edges
+from .lit_image import LitImage
 from .ring_chains import chains
 from .triangulate import RingHits, intersect_rings
 
@@ -62,6 +63,7 @@ class Decoded:
             shape (n_edges,).
         n_saturated: Pixels that the white frame saturates.
         saturated: Some of them, (u, v) in the camera's image, shape (k, 2).
+        lit: Which pixels show which annulus.
     """
 
     cloud: Cloud
@@ -72,6 +74,7 @@ class Decoded:
     outcomes: NDArray[np.int8]
     n_saturated: int
     saturated: Array
+    lit: LitImage
 
     def with_rings(self, numbers: Indices) -> "Decoded":
         """Return this with the rings numbered anew, as a table of them says, (n,)."""
@@ -87,7 +90,8 @@ class Decoded:
         """Return what a device that is off gives."""
         outcomes = np.zeros(0, dtype=np.int8)
         nowhere = np.zeros((0, 2))
-        return cls(Cloud.empty(), 0, 0, {}, ImageEdges.nothing(), outcomes, 0, nowhere)
+        edges, lit = ImageEdges.nothing(), LitImage.nothing()
+        return cls(Cloud.empty(), 0, 0, {}, edges, outcomes, 0, nowhere, lit)
 
 
 Pairs = list[tuple[PairIndex, Decoded]]
@@ -116,11 +120,12 @@ def decode(
             f"in {patterns.n_frames}: white, black, {patterns.n_bits} bits and the "
             f"root disc, each with its inverse"
         )
-    edges, lit_pixels, changes = find_edges(frames, patterns)
+    edges, lit, lit_pixels, changes = find_edges(frames, patterns)
     saturated = np.argwhere(frames.stack[0] >= SATURATED)[:, ::-1] + np.array(
         frames.corner, dtype=np.float64
     )
     # Out of order, what labels are left are chance.
+    believed = not _out_of_order(*changes)
     return measure_edges(
         edges,
         patterns,
@@ -129,7 +134,8 @@ def decode(
         saturated,
         min_conditioning=min_conditioning,
         max_slant=max_slant,
-        believed=not _out_of_order(*changes),
+        believed=believed,
+        lit=lit if believed else None,
     )
 
 
@@ -143,11 +149,12 @@ def measure_edges(
     min_conditioning: float,
     max_slant: float = _MAX_SLANT,
     believed: bool = True,
+    lit: LitImage | None = None,
 ) -> Decoded:
     """Measure the points of labelled edges, wherever the labels come from.
 
     Unless the labels can be believed, all edges are left out. Saturated pixels are
-    (u, v), shape (k, 2); the rest is as in `decode`.
+    (u, v), shape (k, 2); the rest is as in `decode` and `Decoded`.
     """
     camera, projector = calibration.camera, calibration.projector
     rays = camera.rays(edges.pixels)
@@ -180,6 +187,7 @@ def measure_edges(
         outcomes,
         len(saturated),
         saturated[:: max(1, len(saturated) // _SATURATED_KEPT)],
+        lit or LitImage.nothing(),
     )
 
 
@@ -235,4 +243,5 @@ def _cloud(
         conditioning=hits.conditioning,
         shift=moved - (slide / hits.conditioning)[:, None] * rays,
         noise_px=edges.noise_px,
+        blur_px=edges.blur_px,
     )

@@ -21,6 +21,8 @@ from planning.verify.reconstruction.arrays import (
 )
 from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
 
+from .lit_image import LitImage
+
 # A pixel is lit if white exceeds black by this many levels of 255.
 MIN_CONTRAST = 10.0
 SATURATED = 254.5
@@ -44,6 +46,7 @@ class ImageEdges(Columns):
         roots: Sign of r.m, from the root disc, shape (n,).
         across: Unit direction in the image across the edge, shape (n, 2).
         noise_px: Standard deviation of the position along `across` [px], shape (n,).
+        blur_px: That of the blur of the edge along it [px]; NaN: unknown, shape (n,).
     """
 
     pixels: Array
@@ -51,23 +54,25 @@ class ImageEdges(Columns):
     roots: NDArray[np.int8]
     across: Array
     noise_px: Array
+    blur_px: Array
 
     @classmethod
     def nothing(cls) -> "ImageEdges":
         """Return no edges."""
         places, numbers = np.zeros((0, 2)), np.zeros(0)
         rings, roots = numbers.astype(np.int64), numbers.astype(np.int8)
-        return cls(places, rings, roots, places, numbers)
+        return cls(places, rings, roots, places, numbers, numbers)
 
 
 def find_edges(
     frames: Frames, patterns: RingsForCamera
-) -> tuple[ImageEdges, int, Indices]:
+) -> tuple[ImageEdges, LitImage, int, Indices]:
     """Return the labelled ring edges of a stack of images.
 
     Returns:
-        The edges; how many pixels are lit; and, shape (2, n_bits), the changes of one
-        bit alone between lit pixels, and those of them that name a ring.
+        The edges; which pixels show which annulus; how many pixels are lit; and, shape
+        (2, n_bits), the changes of one bit alone between lit pixels, and those of them
+        that name a ring.
     """
     reader = _Reader(frames.stack, patterns)
     noise = reader.grey_noise()
@@ -80,7 +85,8 @@ def find_edges(
     steep = np.abs(across[:, 1]) > np.abs(across[:, 0])
     edges = ImageEdges.join([by_rows.take(flat), by_columns.take(steep)])
     edges = replace(edges, pixels=edges.pixels + np.array(frames.corner))
-    return edges, int(np.count_nonzero(reader.valid)), changes + more
+    lit = LitImage.of(reader.index, frames.corner)
+    return edges, lit, int(np.count_nonzero(reader.valid)), changes + more
 
 
 class _Reader:
@@ -190,7 +196,7 @@ def _crossings(reader: _Reader, noise: float) -> tuple[ImageEdges, Indices]:
     root = 0.5 * (reader.level(root_frame, i, j) + reader.level(root_frame, i, j + 1))
     good = ((first > 0.0) != (second > 0.0)) & (np.abs(root) >= _MIN_CERTAINTY)
     i, j, first, second = i[good], j[good], first[good], second[good]
-    zero, spread = _zero_between(first, second)
+    zero, spread, blur = _zero_between(first, second)
     along, cross = along[good].astype(np.float64), cross[good].astype(np.float64)
     slope = np.hypot(along, cross)
     contrast = 0.5 * (reader.contrast[i, j] + reader.contrast[i, j + 1])
@@ -200,6 +206,7 @@ def _crossings(reader: _Reader, noise: float) -> tuple[ImageEdges, Indices]:
         np.where(root[good] > 0.0, 1, -1).astype(np.int8),
         np.column_stack([along, cross]) / slope[:, None],
         np.sqrt(2.0) * noise / contrast * spread * np.abs(along) / slope,
+        blur * np.abs(along) / slope,
     )
     return edges, np.array([flips, named])
 
@@ -210,20 +217,22 @@ def _count_single(flipped: NDArray[np.int16], n_bits: int) -> Indices:
     return count[1 << np.arange(n_bits)].astype(np.int64)
 
 
-def _zero_between(first: Grey, second: Grey) -> tuple[Array, Array]:
+def _zero_between(first: Grey, second: Grey) -> tuple[Array, Array, Array]:
     """Where between levels of two pixels a blurred step crosses zero, and how surely.
 
     A blurred step is an error function, whose inverse makes it a straight line: with
     a, b = erfinv(first), erfinv(second) the crossing is at a / (a - b). Its standard
-    deviation is for levels that have one of 1.
+    deviation is for levels that have one of 1; that of the blur, 1 / (sqrt(2) |a - b|),
+    comes third.
     """
     a, b = (
         erfinv(np.clip(level, -_MAX_LEVEL, _MAX_LEVEL).astype(np.float64))
         for level in (first, second)
     )
-    rise = np.square(a - b)
-    spread = np.hypot(b * np.exp(a * a), a * np.exp(b * b)) / rise
-    return a / (a - b), 0.5 * np.sqrt(np.pi) * spread
+    rise = np.abs(a - b)
+    spread = np.hypot(b * np.exp(a * a), a * np.exp(b * b)) / np.square(rise)
+    blur = np.sqrt(0.5) / rise
+    return a / (a - b), 0.5 * np.sqrt(np.pi) * spread, blur
 
 
 def _row_slope(reader: _Reader, frame: Indices, i: Indices, j: Indices) -> Grey:

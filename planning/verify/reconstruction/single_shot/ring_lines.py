@@ -60,7 +60,8 @@ def find_lines(frames: Frames, width_px: float) -> ImageEdges:
     spread = noise / (np.sqrt(8.0 * np.pi) * scale * scale * np.abs(curve[inside]))
     pixels = places[inside] + np.array(frames.corner)
     ring, root = np.full(len(pixels), -1), np.zeros(len(pixels), dtype=np.int8)
-    return ImageEdges(pixels, ring, root, across[inside], spread)
+    unknown = np.full(len(pixels), np.nan)
+    return ImageEdges(pixels, ring, root, across[inside], spread, unknown)
 
 
 def _falls(smooth: Array, places: Array, reach: Array, least: Array) -> Mask:

@@ -1,0 +1,200 @@
+"""What several cameras measured of one ring: one curve, since light lands once.
+
+Each ray of light meets the object in one point. On the surface of light behind a ring,
+with s the length along the ring and t that along the light, all cameras measure the
+same curve t(s), and another depth at the same s contradicts.
+"""
+
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.verify.reconstruction.arrays import Array, Indices, Mask
+from planning.verify.reconstruction.cloud import TEXTURE_PX, Cloud
+from planning.verify.reconstruction.scanner import Scanner
+
+from .overlaps import pixel_sizes
+
+_T = TypeVar("_T", bound=np.generic)
+
+# Points this far along a ring are of one place, and lines are fitted through those
+# within either reach [px].
+_REACHES_PX = (0.75, 1.5)
+# Better points of other cameras this near on both sides make one redundant [px].
+_BESIDE_PX = 0.6
+# Neighbours that are looked at on either side, for each camera of a rig.
+_LOOKED_AT = 3
+# Slope of t over s that neighbours on one surface have at most, and surely keep below.
+_STEEPEST, _SURE_SLOPE = 2.0, 0.5
+# Deviations within which neighbours are of one surface, and surely are.
+_SIGMAS, _SURE_SIGMAS = 4.0, 3.0
+# Estimates within different reaches agree within this many of their deviations.
+_AGREE = 2.0
+# Share of a point's slide that counts whatever the curve's slope is.
+_ASTRAY = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class RingCurves:
+    """Points along their rings, and which of them are neighbours there.
+
+    Attributes:
+        order: Index of each in the cloud, shape (n,).
+        camera: Of each, shape (n,).
+        slide: Changes of s and t by the standard deviation of its edge [m], (n, 2).
+        one: Places of points in `order`, shape (n_links,).
+        other: Of a neighbour of each.
+        apart: How much larger its s is [m].
+        rise: How much larger its t is [m].
+        apart_px: `apart` in pixels of the camera that measured the first point.
+    """
+
+    order: Indices
+    camera: Indices
+    slide: Array
+    one: Indices
+    other: Indices
+    apart: Array
+    rise: Array
+    apart_px: Array
+
+    @classmethod
+    def of(cls, cloud: Cloud, plan: Scanner) -> "RingCurves":
+        """Lay a cloud along its rings."""
+        angle, radius, depth = np.empty((3, len(cloud)))
+        slide = np.empty((len(cloud), 2))
+        noise = np.hypot(cloud.noise_px, TEXTURE_PX)
+        for p, projector in enumerate(plan.projectors):
+            chosen = np.flatnonzero(cloud.projector == p)
+            points, beams = cloud.points[chosen], cloud.beams[chosen]
+            x, y, _ = projector.to_ring(points).T
+            angle[chosen], radius[chosen] = np.arctan2(y, x), np.hypot(x, y)
+            turn = np.column_stack([-y, x]) / np.maximum(radius[chosen], 1e-12)[:, None]
+            tangent = turn @ projector.world_from_ring[:3, :2].T
+            depth[chosen] = np.einsum("ij,ij->i", points - projector.centre, beams)
+            for k, along in enumerate((tangent, beams)):
+                moved = np.einsum("ij,ij->i", cloud.shift[chosen], along)
+                slide[chosen, k] = noise[chosen] * moved
+        n_rings = int(cloud.ring.max(initial=0)) + 1
+        ring = cloud.projector.astype(np.int64) * n_rings + cloud.ring
+        order = np.lexsort((angle, ring))
+        ring, angle, depth = ring[order], angle[order], depth[order]
+        metres, pixel = radius[order], pixel_sizes(cloud, plan)[order]
+        most = _LOOKED_AT * (int(cloud.camera.max(initial=0)) + 1)
+        ends: list[Indices] = [order[:0]]
+        further: list[Indices] = [order[:0]]
+        for k in range(1, min(len(cloud), most + 1)):
+            apart = (angle[k:] - angle[:-k]) * metres[:-k]
+            near = (ring[k:] == ring[:-k]) & (apart <= _REACHES_PX[-1] * pixel[:-k])
+            ends.append(np.flatnonzero(near))
+            further.append(ends[-1] + k)
+        one, other = np.concatenate(ends), np.concatenate(further)
+        apart = (angle[other] - angle[one]) * metres[one]
+        rise, camera = depth[other] - depth[one], cloud.camera[order].astype(np.int64)
+        return cls(
+            order, camera, slide[order], one, other, apart, rise, apart / pixel[one]
+        )
+
+    def only(self, points: Mask) -> "RingCurves":
+        """Return the same with neighbours among some of the cloud's points, (n,)."""
+        kept = points[self.order]
+        return self._linked(kept[self.one] & kept[self.other])
+
+    def evidence(self) -> tuple[Mask, Mask]:
+        """Return which points another camera confirms, and which one contradicts."""
+        two = self._linked(self._of_two_cameras())
+        spread = np.linalg.norm(self.slide, axis=1)
+        agree = two._on_one_surface(spread)
+        noise = np.hypot(spread[agree.one], spread[agree.other])
+        limit = _SURE_SIGMAS * noise + _SURE_SLOPE * agree.apart
+        surely = agree._linked(np.abs(agree.rise) <= limit)
+        ends = [np.concatenate([some.one, some.other]) for some in (two, agree, surely)]
+        near, may_be, confirmed = np.zeros((3, len(self.order)), dtype=bool)
+        for met, at in zip((near, may_be, confirmed), ends, strict=True):
+            met[at] = True
+        return self._in_cloud(confirmed), self._in_cloud(near & ~may_be)
+
+    def fitted(self) -> tuple[Array, Array, Mask]:
+        """Fit a line through the points near each, of whatever cameras, within reach.
+
+        With weights ``1 / sigma^2``; of the widest reach at which the estimates of all
+        narrower ones still lie within `_AGREE` deviations (intersecting intervals:
+        Goldenshluger & Nemirovski 1997), so that creases stay.
+
+        Returns:
+            How far each point is from its line along the light [m]; the share of its
+            deviation that is left; and whether it lies between better points of other
+            cameras, shape (n,) each.
+        """
+        slide = np.linalg.norm(self.slide, axis=1)
+        slope = self._on_one_surface(slide)._line(slide)[0]
+        across = self.slide[:, 1] - slope * self.slide[:, 0]
+        first = np.hypot(across, _ASTRAY * slide)
+        curves = self._on_one_surface(first)
+        shift, sigma = np.zeros(len(first)), first.copy()
+        low, high = -_AGREE * sigma, _AGREE * sigma
+        for reach in _REACHES_PX:
+            near = curves._linked(curves.apart_px <= reach)
+            _, offset, spread = near._line(first)
+            low = np.maximum(low, offset - _AGREE * spread)
+            high = np.minimum(high, offset + _AGREE * spread)
+            better = (low <= high) & (spread < sigma)
+            shift = np.where(better, offset, shift)
+            sigma = np.where(better, spread, sigma)
+        remaining, redundant = sigma / first, curves._redundant(first)
+        return (
+            self._in_cloud(shift),
+            self._in_cloud(remaining),
+            self._in_cloud(redundant),
+        )
+
+    def _redundant(self, sigma: Array) -> Mask:
+        near = self._linked((self.apart_px <= _BESIDE_PX) & self._of_two_cameras())
+        before, after = np.zeros((2, len(sigma)), dtype=bool)
+        first = sigma[near.one] < sigma[near.other]
+        before[near.other[first]] = True
+        after[near.one[~first]] = True
+        return before & after
+
+    def _line(self, sigma: Array) -> tuple[Array, Array, Array]:
+        """Slope, offset along t and its deviation of the line about each point."""
+        weight = sigma**-2.0
+        sums = np.zeros((5, len(weight)))
+        sums[0] = weight
+        count = np.zeros(len(weight))
+        ends = (self.one, self.other, 1.0), (self.other, self.one, -1.0)
+        for at, of, sign in ends:
+            w = weight[of]
+            s, t = sign * self.apart, sign * self.rise
+            ws = w * s
+            count += np.bincount(at, minlength=len(weight))
+            for row, term in zip(sums, (w, ws, ws * s, w * t, ws * t), strict=True):
+                row += np.bincount(at, term, len(weight))
+        w, ws, wss, wt, wst = sums
+        det = w * wss - ws * ws
+        good = (count >= 2) & (det > 1e-6 * w * wss)
+        det = np.where(good, det, 1.0)
+        return (
+            np.where(good, (w * wst - ws * wt) / det, 0.0),
+            np.where(good, (wss * wt - ws * wst) / det, 0.0),
+            np.where(good, np.sqrt(wss / det), sigma),
+        )
+
+    def _of_two_cameras(self) -> Mask:
+        return self.camera[self.one] != self.camera[self.other]
+
+    def _on_one_surface(self, sigma: Array) -> "RingCurves":
+        noise = np.hypot(sigma[self.one], sigma[self.other])
+        limit = _SIGMAS * noise + _STEEPEST * self.apart
+        return self._linked(np.abs(self.rise) <= limit)
+
+    def _linked(self, chosen: Mask) -> "RingCurves":
+        names = "one", "other", "apart", "rise", "apart_px"
+        return replace(self, **{name: getattr(self, name)[chosen] for name in names})
+
+    def _in_cloud(self, values: NDArray[_T]) -> NDArray[_T]:
+        there = np.empty_like(values)
+        there[self.order] = values
+        return there
