@@ -129,7 +129,8 @@ print("\n".join(ring_lines(outcome)))
 #
 # The paper's future work asks for the sampling density "given the density of previous
 # light sources". Rings can't come nearer to each other than images resolve; a second
-# sequence with its rings midway doubles the density all the same.
+# sequence doubles the density all the same. Its rings go where the first one's points
+# bend most between its rings.
 
 # %%
 both = double_density(outcome)

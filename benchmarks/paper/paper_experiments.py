@@ -128,8 +128,8 @@ def rings(outcomes: dict[tuple[str, str], Outcome]) -> None:
 
 
 def second_sequences(outcomes: dict[tuple[str, str], Outcome]) -> None:
-    """Print what a second, shifted sequence adds."""
-    print("## A second sequence, its rings midway between the first's\n")
+    """Print what a second sequence adds."""
+    print("## A second sequence, its rings where the first leaves most error\n")
     rows: list[list[str]] = []
     for (name, variant), outcome in outcomes.items():
         both = double_density(outcome, threads=1)

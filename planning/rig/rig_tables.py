@@ -166,7 +166,7 @@ class RingsTable(Table):
     tilt_deg: Annotated[float, Field(ge=0.0, lt=45.0)] = 8.0
     gap_mm: Annotated[float, Field(ge=0.01)] | None = None
     spacing: Literal["uniform", "curvature"] = "curvature"
-    axis: RingAxis = "free"
+    axis: RingAxis = "auto"
     margin_mm: Annotated[float, Field(ge=0.0)] = 15.0
 
 
