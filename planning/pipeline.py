@@ -152,17 +152,19 @@ def plan_rig(
         plan, partial = planned(request, clock, keep)
         if check and not plan.document.truncated:
             plan = _checked(plan, partial, clock, keep)
-            if _axes_may_help(plan, partial):
+            if axes_may_help(plan, partial):
                 clock.say("  centred ring axes don't pass the check: free ones")
                 freed = replace(request, axis_wanted="free")
-                other = _checked(*planned(freed, clock, keep), clock, keep)
-                plan = other if not missed_by(other, check=True) else plan
+                other, partial = planned(freed, clock, keep)
+                if not other.document.truncated:
+                    other = _checked(other, partial, clock, keep)
+                    plan = plan if missed_by(other, check=True) else other
     if missed := missed_by(plan, check=check):
         raise RequirementError(plan, missed)
     return plan
 
 
-def _axes_may_help(plan: RigPlan, partial: PartialPlan) -> bool:
+def axes_may_help(plan: RigPlan, partial: PartialPlan) -> bool:
     """Whether only the check isn't passed, and centred ring axes weren't asked for."""
     if partial.axes == "free" or partial.request.ring_axis != "auto":
         return False

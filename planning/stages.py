@@ -205,13 +205,31 @@ def with_free_axes(
 
     None where that was asked for, or enough is measured.
     """
-    areas, left = plan.coverage.target, partial.request.ring_axis == "auto"
-    measured, reachable = areas.measured_m2, areas.reachable_by_cameras_m2
-    short = falls_short(measured, reachable, plan.requirements.coverage)
-    if not (left and partial.axes == "centred" and short):
+    left = partial.axes == "centred" and partial.request.ring_axis == "auto"
+    if not left or _short_of(plan) != (False, True):
         return None
     clock.say("  centred ring axes fall short: free ones")
     return placed(partial.ready, partial.stage, clock, "free")
+
+
+def _short_of(plan: RigPlan) -> tuple[bool, bool]:
+    """Whether less than is required is lit, and measured, in all or of a region."""
+    required, areas = plan.requirements, plan.coverage.target
+    floors = [
+        below_floor(region.coverage, required.region_coverage)
+        for region in plan.document.regions
+        if region.coverage is not None and region.coverage.floor == "missed"
+    ]
+    return (
+        any(unlit for unlit, _ in floors)
+        or falls_short(
+            areas.lit_m2, areas.reachable_by_projectors_m2, required.dominant_coverage
+        ),
+        any(unmeasured for _, unmeasured in floors)
+        or falls_short(
+            areas.measured_m2, areas.reachable_by_cameras_m2, required.coverage
+        ),
+    )
 
 
 def one_device_more(
@@ -221,23 +239,15 @@ def one_device_more(
 
     The proved bound stays what it is; the count is then above it, and says so.
     """
-    required, areas = plan.requirements, plan.coverage.target
-    floors = [
-        below_floor(region.coverage, required.region_coverage)
-        for region in plan.document.regions
-        if region.coverage is not None and region.coverage.floor == "missed"
-    ]
-    if any(unlit for unlit, _ in floors) or falls_short(
-        areas.lit_m2, areas.reachable_by_projectors_m2, required.dominant_coverage
-    ):
+    required = plan.requirements
+    unlit, unmeasured = _short_of(plan)
+    if unlit:
         stage = larger(partial.stage, partial.stage.projectors, required.max_projectors)
         if stage is not None:
             clock.say("  fresh samples fall short: one projector more")
             stage = replace(stage, projectors=stage.by_count[stage.certificate.count])
             return placed(partial.ready, stage, clock)
-    if any(unmeasured for _, unmeasured in floors) or falls_short(
-        areas.measured_m2, areas.reachable_by_cameras_m2, required.coverage
-    ):
+    if unmeasured:
         views = larger(partial.camera_stage, partial.cameras, required.max_cameras)
         if views is not None:
             clock.say("  fresh samples fall short: one camera more")

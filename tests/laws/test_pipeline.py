@@ -7,16 +7,20 @@ import shutil
 from contextlib import redirect_stdout
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from support.plain_shapes import box
 
 from geometry.shapes.sample_head.sample_head import sample_head
-from planning import RigPlan, load_rig, plan_rig, verify_plan
+from planning import RigPlan, load_rig, plan_rig, stages, verify_plan
 from planning.model.errors import InfeasibleLimitsError, InputError, TimeLimitError
 from planning.model.plan import InterruptedPlanError, RequirementError
+from planning.model.progress import Stopwatch
+from planning.pipeline import axes_may_help
 from planning.report.summary.summary import summary
+from planning.stages import with_free_axes
 from planning.verify.audit.audit import audit_plan
 
 README = Path(__file__).resolve().parents[2] / "README.md"
@@ -79,6 +83,46 @@ def test_every_requirement_is_met_and_the_check_passed(plan):
     assert check["accuracy_rms_m"] <= asked.check.max_rms_m
     assert check["predicted_missing"] <= asked.check.max_predicted_missing
     assert 1e-3 < asked.check.tau_m < 8e-3
+
+
+def test_free_axes_are_tried_where_centred_ones_alone_fall_short(plan, monkeypatch):
+    """Where the check alone, or what is measured, is missed and nothing was asked."""
+    axes = plan.document.ring_axes
+    assert axes.asked == "auto"
+    assert axes.other.axis != axes.taken
+
+    def drawn(taken="centred", asked="auto"):
+        request = SimpleNamespace(ring_axis=asked)
+        return SimpleNamespace(axes=taken, request=request, ready=0, stage=0)
+
+    checked = plan.document.reconstruction
+    failed = checked.changed(passed=False, failures=("rms distance",))
+    missed = RigPlan(plan.document.changed(reconstruction=failed), plan.surface)
+    assert axes_may_help(missed, drawn())
+    assert not axes_may_help(plan, drawn())
+    assert not axes_may_help(missed, drawn("free"))
+    assert not axes_may_help(missed, drawn(asked="centred"))
+
+    monkeypatch.setattr(stages, "placed", lambda *words: words[-1])
+    target = plan.coverage.target
+
+    def short(**areas):
+        coverage = plan.coverage.changed(target=target.changed(**areas))
+        document = plan.document.changed(coverage=coverage)
+        return RigPlan(document, plan.surface)
+
+    little = 0.5 * target.measured_m2
+    unmeasured, unlit = short(measured_m2=little), short(lit_m2=0.5 * target.lit_m2)
+    assert not axes_may_help(
+        RigPlan(unmeasured.document.changed(reconstruction=failed), plan.surface),
+        drawn(),
+    )
+    clock = Stopwatch()
+    assert with_free_axes(drawn(), unmeasured, clock) == "free"
+    assert with_free_axes(drawn(), plan, clock) is None
+    assert with_free_axes(drawn(), unlit, clock) is None
+    assert with_free_axes(drawn("free"), unmeasured, clock) is None
+    assert with_free_axes(drawn(asked="centred"), unmeasured, clock) is None
 
 
 def test_areas_are_nested_and_causes_add_up(plan):
