@@ -1,23 +1,27 @@
 """Regions: what becomes of the worst with and without a floor, and what they decide.
 
-Usage: python -m benchmarks.plans.region_shares [NAME ...] [--floors F ...]
+Usage: python -m benchmarks.plans.region_shares [NAME ...] [--floors F ...] [--causes]
 
 For the sample and the twelve meshes in `../shared/data/meshes` (those named, if any),
-as many devices as it takes and the default rig: projectors and cameras by covers, no
-bounds, baselines or rings; what is claimed rests on fresh samples. First table, for
-each floor F (by default 0 and the rig's): devices, large regions below F, the least
-lit share of a large region of what projectors reach, the least measured one of what
-cameras reach, and processor seconds. Second table, what the paper lets decide the
-number of projectors and what else could: regions (and large ones), their cones, the
-fewest of 640 directions of light from afar that meet the required share of the target
-within the incidence limit if nothing shadows anything (`by normals`), the same with the
-object's own shadows, of what any direction reaches (`and shadows`), and the projectors
-of the lowest F. Below it rank correlations (Spearman) with the projectors.
+the smallest file first, as many devices as it takes, with the default rig. For each
+floor F (by default 0 and the rig's), by covers alone (no bounds over all poses,
+baselines or rings; what is claimed rests on fresh samples): devices, large regions
+below F, the least lit share of a large region of what projectors reach, the least
+measured one of what cameras reach, and processor seconds.
+
+With `--causes` instead what the paper lets decide the number of projectors, and what
+else could: regions (and large ones), their cones, the fewest of 640 directions of light
+from afar that meet the required share of the target within the incidence limit if
+nothing shadows anything (`by normals`), the same with the object's own shadows, of what
+any direction reaches (`and shadows`), and the fewest candidate projectors on the
+planner's first 2,000 samples, no floor asked for; below it rank correlations (Spearman)
+with these.
 """
 
 import argparse
 import sys
 import time
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -30,11 +34,11 @@ from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import fibonacci_cap
 from planning import load_rig
-from planning.model.errors import InfeasibleLimitsError
 from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
 from planning.model.words import percent
 from planning.prepare import prepared
+from planning.projectors.projector_stage import plan_projectors
 from planning.report.assemble import write_plan
 from planning.report.partial_plan import PlanRequest, Prepared
 from planning.rig.wishes import Wishes
@@ -43,35 +47,35 @@ from planning.stages import first_projectors, one_device_more, placed
 from solvers import CoverProblem, solve_cover
 
 _DIRECTIONS = 640
+# Name, mesh, and axis that points up.
+_Job = tuple[str, TriangleMesh, str | None]
 
 
 def main() -> int:
-    """Print both tables; rows of the second on standard error as they come."""
+    """Print a table."""
     given = _arguments()
-    rows: list[tuple[str, tuple[int, ...]]] = []
+    meshes = (
+        (path.name, cut_for_curvature(load_mesh(path, **options))[0], up)  # pyright: ignore[reportArgumentType]
+        for path, options, up in sorted(jobs(given.names), key=_size)
+    )
+    if given.causes:
+        _print_causes(meshes)
+    else:
+        _print_shares(meshes, given.floors)
+    return 0
+
+
+def _print_shares(meshes: Iterator[_Job], floors: Sequence[float]) -> None:
     print(
         "| mesh | F | projectors | cameras | regions below F | least lit | "
         "least measured | CPU [s] |\n|---|---|---|---|---|---|---|---|",
         flush=True,
     )
-    least = min(given.floors)
-    for path, options, up in sorted(jobs(given.names), key=_size):
-        mesh, _ = cut_for_curvature(load_mesh(path, **options))  # pyright: ignore[reportArgumentType]
-        for floor in given.floors:
+    for name, mesh, up in meshes:
+        for floor in floors:
             begin = time.process_time()
-            try:
-                ready = _ready(mesh, up, floor)
-                plan = _planned(ready)
-            except InfeasibleLimitsError as error:
-                print(f"| {path.name} | {floor:g} | none: {error} |", flush=True)
-                continue
-            seconds = time.process_time() - begin
-            print(_line(path.name, floor, plan, seconds), flush=True)
-            if floor == least:
-                rows.append(_causes(path.name, ready, plan))
-                print(rows[-1], file=sys.stderr, flush=True)
-    _print_causes(rows)
-    return 0
+            plan = _planned(_ready(mesh, up, floor))
+            print(_line(name, floor, plan, time.process_time() - begin), flush=True)
 
 
 def _size(job: tuple[Path, dict[str, object], str | None]) -> int:
@@ -83,6 +87,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("names", nargs="*", metavar="NAME")
     default = load_rig("default").table.requirements.region_coverage
     parser.add_argument("--floors", nargs="+", type=float, default=(0.0, default))
+    parser.add_argument("--causes", action="store_true")
     return parser.parse_args()
 
 
@@ -136,41 +141,44 @@ def _line(name: str, floor: float, plan: RigPlan, seconds: float) -> str:
     )
 
 
-def _causes(name: str, ready: Prepared, plan: RigPlan) -> tuple[str, tuple[int, ...]]:
-    """A line of the second table, and its numbers."""
-    cones = np.degrees([r.cone_angle for r in plan.document.regions])
-    n, large, count = len(cones), len(_large(plan)), len(plan.projectors)
-    normals, shadows = _directions(ready, plan)
-    line = (
-        f"| {name} | {n} ({large}) | {np.median(cones):.0f}°, {cones.max():.0f}° | "
-        f"{normals} | {shadows} | {count} | {count / n:.2f} |"
-    )
-    return line, (n, large, normals, shadows, count)
-
-
-def _print_causes(rows: list[tuple[str, tuple[int, ...]]]) -> None:
+def _print_causes(meshes: Iterator[_Job]) -> None:
     print(
-        "\n| mesh | regions (large) | cones, median and widest | by normals | "
-        "and shadows | projectors | P/regions |\n|---|---|---|---|---|---|---|"
+        "| mesh | regions (large) | cones, median and widest | by normals | "
+        "and shadows | projectors | per region |\n|---|---|---|---|---|---|---|",
+        flush=True,
     )
-    print("\n".join(line for line, _ in rows), "\n")
-    table = np.array([numbers for _, numbers in rows])
+    rows: list[tuple[int, ...]] = []
+    for name, mesh, up in meshes:
+        ready = _ready(mesh, up, 0.0)
+        cones = np.degrees([region.cone_angle for region in ready.regions])
+        n, large = len(cones), len(ready.scene.large_regions)
+        normals, shadows = _directions(ready)
+        n_poses = ready.request.rig.n_projector_poses
+        stage = plan_projectors(ready.scene, ready.template, n_poses, rounds=1)
+        count = stage.certificate.needed.count
+        rows.append((n, large, normals, shadows, count))
+        print(
+            f"| {name} | {n} ({large}) | {np.median(cones):.0f}°, {cones.max():.0f}° | "
+            f"{normals} | {shadows} | {count} | {count / n:.2f} |",
+            flush=True,
+        )
     names = "regions", "large regions", "directions by normals", "and shadows"
+    print()
     for k, name in enumerate(names if len(rows) > 2 else ()):
-        rank, p = spearmanr(table[:, k], table[:, -1])
+        rank, p = spearmanr([row[k] for row in rows], [row[-1] for row in rows])
         print(
             f"* {name} and projectors: rank correlation {rank:.2f} (p = {p:.2g}, "
-            f"{len(table)} meshes)"
+            f"{len(rows)} meshes)"
         )
 
 
-def _directions(ready: Prepared, plan: RigPlan) -> tuple[int, int]:
+def _directions(ready: Prepared) -> tuple[int, int]:
     """Fewest directions of light from afar for the required share of the target.
 
     Of all its samples, if nothing shadows anything; and of those that some direction
     reaches, shadows of the object included.
     """
-    limits, mesh = plan.requirements, ready.scene.mesh
+    limits, mesh = ready.scene.requirements, ready.scene.mesh
     samples = ready.scene.target_samples(DRAWS.projectors).samples
     backs = fibonacci_cap(_DIRECTIONS, np.array([0.0, 0.0, 1.0]), np.pi)
     meets = samples.normals @ backs.T >= np.cos(limits.projector.max_incidence)

@@ -1,5 +1,6 @@
 """Samples of the audit: independent random draws, never the planner's."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,6 +38,12 @@ class AuditSamples:
     def __len__(self) -> int:
         return len(self.points)
 
+    @classmethod
+    def joined(cls, parts: Sequence["AuditSamples"]) -> "AuditSamples":
+        """Return several sets of samples as one."""
+        columns = zip(*(vars(part).values() for part in parts), strict=True)
+        return cls(*(np.concatenate(column) for column in columns))
+
     def take(self, chosen: Ints | Mask) -> "AuditSamples":
         """Return some of the samples, each still standing for the same area."""
         return AuditSamples(*(column[chosen] for column in vars(self).values()))
@@ -62,8 +69,7 @@ def draw_samples(surface: Surface, target: str, n: int, seed: int) -> AuditSampl
     whole = not areas[~inside].sum() > 0.0
     parts = [(inside, n)] if whole else [(inside, (n + 1) // 2), (~inside, n // 2)]
     drawn = [_draw(surface, mask, mask is inside, count, rng) for mask, count in parts]
-    columns = zip(*(vars(part).values() for part in drawn), strict=True)
-    return AuditSamples(*(np.concatenate(column) for column in columns))
+    return AuditSamples.joined(drawn)
 
 
 def draw_region(surface: Surface, region: int, n: int, seed: int) -> AuditSamples:

@@ -1,10 +1,11 @@
 """Claims about what is lit and measured of each region, and about floors."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geometry.arrays import Ints, Mask
 from planning.model.document.coverage_records import (
@@ -14,14 +15,19 @@ from planning.model.document.coverage_records import (
 )
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
-from planning.verify.audit.audit_samples import draw_region
+from planning.verify.audit.audit_samples import AuditSamples, draw_region
 from planning.verify.audit.estimates import POINT, ROUNDING, share_error
 from planning.verify.audit.predicates.predicates import (
     LIGHT_CAUSES,
     PAIR_CAUSES,
     SIGHT_CAUSES,
 )
-from planning.verify.audit.predicates.recompute import reachable_by, recompute
+from planning.verify.audit.predicates.recompute import (
+    Reachable,
+    Recomputed,
+    reachable_by,
+    recompute,
+)
 
 # Samples of the audit in a large region, and of the plan, which earns no more tolerance
 # for stating fewer.
@@ -30,19 +36,8 @@ _SLACK = 1e-9
 _CAUSES = LIGHT_CAUSES + SIGHT_CAUSES + PAIR_CAUSES
 
 
-@dataclass(frozen=True, eq=False)
-class _RegionFigures:
-    """What becomes of the audit's n samples in one region.
-
-    Attributes:
-        covered: Which are in each of its areas, the smallest first, shape (n,) each.
-        measured_by: Whether each camera measures each, shape (n_c, n).
-        cause: Index in `_CAUSES`, -1 where measured, shape (n,).
-    """
-
-    covered: dict[str, Mask]
-    measured_by: Mask
-    cause: Ints
+# What becomes of samples, what could, and which region they lie in.
+_Parts = Sequence[tuple[Recomputed, Reachable]]
 
 
 def audit_floors(case: AuditCase, findings: AuditFindings) -> None:
@@ -51,6 +46,7 @@ def audit_floors(case: AuditCase, findings: AuditFindings) -> None:
     Plans from before have none of these, and no floors.
     """
     plan, large = case.plan, case.large_regions
+    parts = _parts(case) if any(r.coverage for r in plan.document.regions) else ()
     share = plan.requirements.region_coverage
     for region in plan.document.regions:
         below = findings.at(f"regions.{region.id}")
@@ -65,9 +61,7 @@ def audit_floors(case: AuditCase, findings: AuditFindings) -> None:
         if region.area_m2 > 0.0:
             lit = region.coverage.lit_m2 / region.area_m2
             below.number("lit_fraction", region.lit_fraction, lit, ROUNDING, "")
-            _audit_coverage(
-                case, region, region.coverage, region.id in large, below.at("coverage")
-            )
+            _audit_coverage(case, region, region.coverage, parts, below.at("coverage"))
     _audit_worst(case, large, findings)
 
 
@@ -97,7 +91,7 @@ def _audit_coverage(
     case: AuditCase,
     region: RegionRecord,
     areas: RegionCoverage,
-    large: bool,
+    parts: _Parts,
     findings: AuditFindings,
 ) -> None:
     """Check that the areas are parts of each other, and what they and causes are.
@@ -106,15 +100,27 @@ def _audit_coverage(
     three standard errors. Where no sample of either fell into it there is nothing to
     compare.
     """
-    figures = _figures(case, region.id, _AT_LEAST if large else 0)
-    whole, n = region.area_m2, len(figures.cause)
+    inside = [actual.samples.region == region.id for actual, _ in parts]
+
+    def joined(columns: Iterable[NDArray[Any]]) -> NDArray[Any]:
+        pairs = zip(columns, inside, strict=True)
+        return np.concatenate([column[..., mask] for column, mask in pairs], axis=-1)
+
+    covered = {
+        "measured_m2": joined(a.measured for a, _ in parts),
+        "reachable_by_cameras_m2": joined(r.cameras for _, r in parts),
+        "lit_m2": joined(a.lit for a, _ in parts),
+        "reachable_by_projectors_m2": joined(r.projectors for _, r in parts),
+    }
+    cause = joined(actual.cause for actual, _ in parts)
+    large, whole, n = region.id in case.large_regions, region.area_m2, len(cause)
     fallen = case.plan.coverage.samples * whole / case.estimator.target_m2
     n_claimed = max(areas.samples, int(fallen), _CLAIMED if large else 0)
     unmeasured = whole - areas.measured_m2
     if areas.samples < 1:
         findings.holds(not large, "samples", f"{areas.samples!r} of a large region")
         return
-    claimed = {name: getattr(areas, name) for name in figures.covered}
+    claimed = {name: getattr(areas, name) for name in covered}
     for (smaller, low), (larger, high) in pairwise((claimed | {"area": whole}).items()):
         findings.holds(
             -ROUNDING * whole <= low <= high + ROUNDING * whole,
@@ -128,17 +134,19 @@ def _audit_coverage(
     findings.number(f"{key} (sum)", sum(causes.values()), unmeasured, 1e-4 * whole)
     if n == 0:
         return
-    masks = {name: (claimed[name], mask) for name, mask in figures.covered.items()}
+    masks = {name: (claimed[name], mask) for name, mask in covered.items()}
     masks |= {
         f"{key}.{cause}": (causes.get(cause, 0.0), mask)
-        for cause, mask in _by_cause(figures.cause)
+        for cause, mask in _by_cause(cause)
     }
     names, by = [camera.id for camera in case.plan.cameras], areas.measured_by
     stranger = ", ".join(sorted(set(by) - set(names)))
     findings.holds(not stranger, "measured_by", f"cameras that aren't: {stranger}")
     masks |= {
         f"measured_by.{name}": (by.get(name, 0.0), mask)
-        for name, mask in zip(names, figures.measured_by, strict=True)
+        for name, mask in zip(
+            names, joined(a.measured_by for a, _ in parts), strict=True
+        )
     }
     for name, (area, mask) in masks.items():
         count = np.array(mask.sum())
@@ -152,26 +160,21 @@ def _by_cause(cause: Ints) -> Iterator[tuple[str, Mask]]:
         yield name, np.isin(cause, [k for k, c in enumerate(_CAUSES) if c == name])
 
 
-def _figures(case: AuditCase, number: int, at_least: int) -> _RegionFigures:
-    """The audit's samples in a region, and more of it where they are too few."""
-    parts = [(case.actual, case.reachable, case.samples.region == number)]
-    lack = at_least - int(parts[0][2].sum())
-    if lack > 0:
-        more = draw_region(case.plan.surface, number, lack, case.seed)
-        actual = recompute(case.plan, more, case.shadow)
+def _parts(case: AuditCase) -> _Parts:
+    """The audit's samples, and more of large regions in which they are too few."""
+    parts = [(case.actual, case.reachable)]
+    surface, region = case.plan.surface, case.samples.region
+    lacking = {r: _AT_LEAST - int((region == r).sum()) for r in case.large_regions}
+    more = [
+        draw_region(surface, r, n, case.seed)
+        for r, n in sorted(lacking.items())
+        if n > 0
+    ]
+    if more:
+        actual = recompute(case.plan, AuditSamples.joined(more), case.shadow)
         reachable = reachable_by(case.plan, actual, case.shadow, case.seed)
-        parts.append((actual, reachable, np.ones(lack, dtype=bool)))
-    covered = {
-        "measured_m2": [a.measured[mask] for a, _, mask in parts],
-        "reachable_by_cameras_m2": [r.cameras[mask] for _, r, mask in parts],
-        "lit_m2": [a.lit[mask] for a, _, mask in parts],
-        "reachable_by_projectors_m2": [r.projectors[mask] for _, r, mask in parts],
-    }
-    return _RegionFigures(
-        {name: np.concatenate(masks) for name, masks in covered.items()},
-        np.concatenate([a.measured_by[:, mask] for a, _, mask in parts], axis=1),
-        np.concatenate([a.cause[mask] for a, _, mask in parts]),
-    )
+        parts.append((actual, reachable))
+    return parts
 
 
 def _audit_worst(case: AuditCase, large: set[int], findings: AuditFindings) -> None:
