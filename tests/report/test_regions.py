@@ -17,6 +17,7 @@ from support.factories import (
     make_scene,
 )
 
+from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
 from geometry.rays.rays import RayCaster
 from geometry.shapes.primitives import sphere
@@ -194,6 +195,14 @@ def test_places_follow_up_and_the_axes_of_the_mesh(plan, handmade):
     above = re.search(r"(\d+) mm above the lowest point", words)
     height = 1e3 * (0.05 - up.document.regions[1].centre_m[2])
     assert float(above[1]) == pytest.approx(height, abs=1.0)
+
+
+def test_a_flat_object_has_no_thirds(plan):
+    mesh = plan.surface.mesh
+    level = TriangleMesh(mesh.vertices * [1.0, 0.0, 1.0], mesh.faces)
+    flat = replace(plan, surface=replace(plan.surface, mesh=level))
+    words = region_words(flat, plan.document.regions[0])
+    assert words == "region 0 (65.1 cm², towards +z, facing +z down)"
 
 
 def test_every_region_is_shown_on_demand(plan, handmade, tmp_path):

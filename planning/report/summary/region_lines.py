@@ -18,6 +18,8 @@ _AXES = "xyz"
 _TOLD = 0.4
 # Nearer to the middle than this part of the object's width is no side.
 _MIDDLE = 0.1
+# What is lower than this part of its width has no thirds.
+_FLAT = 1e-3
 
 
 def region_words(plan: RigPlan, region: RegionRecord) -> str:
@@ -154,15 +156,16 @@ def _place(plan: RigPlan, region: RegionRecord) -> str:
     mesh, place = plan.surface.mesh, np.array(region.centre_m)
     heights, height = mesh.vertices @ up, float(place @ up)
     low, high = float(heights.min()), float(heights.max())
-    third = ("bottom", "middle", "top")[min(int(3 * (height - low) / (high - low)), 2)]
     across = (place - mesh.centre) - ((place - mesh.centre) @ up) * up
     width = np.ptp(mesh.vertices - heights[:, None] * up, axis=0).max()
     beside = np.linalg.norm(across) > _MIDDLE * width
     side = f"towards {_direction(across, up)}" if beside else "about the middle"
-    return (
-        f", {third} third, {side}, {1e3 * (height - low):.0f} mm above the lowest "
-        f"point, facing {_direction(region.mean_normal, up)}"
-    )
+    facing = f"facing {_direction(region.mean_normal, up)}"
+    if high - low <= _FLAT * width:
+        return f", {side}, {facing}"
+    third = ("bottom", "middle", "top")[min(int(3 * (height - low) / (high - low)), 2)]
+    above = f"{1e3 * (height - low):.0f} mm above the lowest point"
+    return f", {third} third, {side}, {above}, {facing}"
 
 
 def _direction(vector: ArrayLike, up: ArrayLike) -> str:
