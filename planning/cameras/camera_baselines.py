@@ -15,6 +15,7 @@ from planning.cameras.baselines.widest_baselines import (
     WidestBaselines,
 )
 from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.proofs.quotas import Quotas, RegionFloors
 from planning.scene.bodies.clearance import lacks_clearance
 from planning.scene.draws import DRAWS
 from planning.scene.measured import LitSamples, lit_samples, measured_by
@@ -23,6 +24,7 @@ from planning.scene.scene import Scene
 
 from .camera_bodies import lit_among
 
+_Check = Callable[[NDArray[np.float64]], bool]
 # What candidates cover is the measure of all claims: cameras may measure this share of
 # it more, no further. Where candidates cover nearly all that is lit none can.
 _BEYOND, _NEARLY = 0.002, 0.97
@@ -135,22 +137,43 @@ def widen_baselines(
     more samples must agree to each move.
     """
     least_lit = samples.count_lit(cameras)
+    checks = _keeping_floors(samples, cameras, least_lit)
+    checks += [_confirming(samples, cameras)] if confirmed else []
     search = BaselineSearch(
         cameras,
         lambda poses: samples.measured(at_poses(cameras, poses), least_lit),
         samples.surface,
         baseline_limits(samples.scene, spare_field),
         rings=samples.rings,
-        confirm=_confirming(samples, cameras) if confirmed else None,
+        confirm=(lambda poses: all(agrees(poses) for agrees in checks))
+        if checks
+        else None,
         max_evaluations=max_evaluations,
         max_programs=max_programs,
     )
     return search.run()
 
 
-def _confirming(
-    samples: BaselineSamples, cameras: Sequence[PlannedCamera]
-) -> Callable[[NDArray[np.float64]], bool]:
+def _keeping_floors(
+    samples: BaselineSamples, cameras: Sequence[PlannedCamera], least_lit: int
+) -> list[_Check]:
+    """Whether no region falls below its floor by a move, or further; empty: no floors.
+
+    What counts is a share of what is lit, which is no less than what can be measured.
+    """
+    regions = RegionFloors.of(samples.scene, samples.lit.target)
+    if not regions.share:
+        return []
+
+    def measured(standing: Sequence[PlannedCamera]) -> NDArray[np.bool_]:
+        return np.any(samples.measured(standing, least_lit), axis=1)
+
+    lit = np.ones(len(samples.lit.target), dtype=bool)
+    floors = Quotas.of(regions, lit, 0.0, spare=1.0).as_far_as(measured(cameras))
+    return [lambda poses: floors.enough(measured(at_poses(cameras, poses)))]
+
+
+def _confirming(samples: BaselineSamples, cameras: Sequence[PlannedCamera]) -> _Check:
     """Whether further samples, drawn when first needed, lose nothing by a move."""
     scene, projectors = samples.scene, samples.projectors
 

@@ -54,7 +54,7 @@ def fewest_and_most(problem):
     return needed, covered.sum(axis=1)[within & (sets.sum(axis=1) <= needed)].max()
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(6))
 def test_counts_and_weights_equal_brute_force(seed):
     problem = floored(seed)
     needed, most = fewest_and_most(problem)
