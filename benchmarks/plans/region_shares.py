@@ -116,15 +116,13 @@ def _planned(ready: Prepared) -> RigPlan:
 
 def _large(plan: RigPlan) -> list[tuple[float, float]]:
     """Lit and measured share of each large region, of what can be."""
-    least = plan.requirements.region_share * plan.coverage.target.area_m2
     return [
         (
             areas.lit_m2 / areas.reachable_by_projectors_m2,
             areas.measured_m2 / max(areas.reachable_by_cameras_m2, 1e-12),
         )
-        for region in plan.document.regions
-        if region.area_m2 >= least * (1.0 - 1e-9)
-        and (areas := region.coverage) is not None
+        for region in plan.large_regions
+        if (areas := region.coverage) is not None
         and areas.reachable_by_projectors_m2 > 0.0
     ]
 

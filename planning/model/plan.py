@@ -10,7 +10,7 @@ from typing import Any, Self
 from pydantic import ValidationError
 
 from geometry.files.file_content import file_content
-from planning.model.document.coverage_records import Coverage
+from planning.model.document.coverage_records import Coverage, RegionRecord
 from planning.model.document.plan_document import FORMAT, VERSION, PlanDocument
 
 from .errors import PlanFileError, PlanningError
@@ -59,6 +59,16 @@ class RigPlan:
     def coverage(self) -> Coverage:
         """Areas of the surface and the target, and what isn't covered, by cause."""
         return self.document.coverage
+
+    @property
+    def large_regions(self) -> tuple[RegionRecord, ...]:
+        """The regions that a floor is for, by their areas as they are claimed."""
+        least = self.requirements.region_share * self.coverage.target.area_m2
+        return tuple(
+            region
+            for region in self.document.regions
+            if region.area_m2 >= least * (1.0 - 1e-9)
+        )
 
     @cached_property
     def digest(self) -> str:

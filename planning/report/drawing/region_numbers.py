@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.rays.rays import RayCaster
-from planning.model.document.coverage_records import RegionRecord
 from planning.model.plan import RigPlan
 
 # A region of which a view shows less isn't told in it.
@@ -27,7 +26,7 @@ def region_spots(plan: RigPlan, caster: RayCaster, back: _Vector) -> dict[int, _
     mesh, surface = plan.surface.mesh, plan.surface
     back = back / np.linalg.norm(back)
     spots: dict[int, _Vector] = {}
-    for region in _large_regions(plan):
+    for region in plan.large_regions:
         faces = np.flatnonzero(surface.region == region.id)
         whole = mesh.face_areas[faces].sum()
         faces = faces[mesh.face_normals[faces] @ back > 0.0]
@@ -50,14 +49,8 @@ def direction_of_unseen(plan: RigPlan, seen: Iterable[int]) -> _Vector | None:
     told = set(seen)
     normals = [
         region.area_m2 * np.array(region.mean_normal)
-        for region in _large_regions(plan)
+        for region in plan.large_regions
         if region.id not in told
     ]
     total = np.sum(normals, axis=0) if normals else np.zeros(3)
     return total if np.linalg.norm(total) > 1e-9 * plan.surface.mesh.area else None
-
-
-def _large_regions(plan: RigPlan) -> list[RegionRecord]:
-    """The regions that a floor is for."""
-    least = plan.requirements.region_share * plan.coverage.target.area_m2
-    return [r for r in plan.document.regions if r.area_m2 >= least * (1.0 - 1e-9)]

@@ -49,7 +49,7 @@ def region_lines(plan: RigPlan) -> list[str]:
 
 def region_table(plan: RigPlan) -> list[str]:
     """Return every region in a line: size, cone, shares, by which devices, where."""
-    large = {region.id for region, _ in _large(plan)}
+    large = {region.id for region in plan.large_regions}
     lines = [
         "lit is the share of what projectors can reach (of the area), measured that of "
         "what cameras can reach (of what is lit)",
@@ -120,10 +120,9 @@ def _accepting(share: float) -> str:
 
 
 def _large(plan: RigPlan) -> Iterator[tuple[RegionRecord, RegionCoverage]]:
-    """Yield the regions that a floor is for, with their areas."""
-    least = plan.requirements.region_share * plan.coverage.target.area_m2
-    for region in plan.document.regions:
-        if region.coverage is not None and region.area_m2 >= least * (1.0 - 1e-9):
+    """Yield the regions that a floor is for, with their areas; none of older plans."""
+    for region in plan.large_regions:
+        if region.coverage is not None:
             yield region, region.coverage
 
 
@@ -170,7 +169,9 @@ def _place(plan: RigPlan, region: RegionRecord) -> str:
 
 def _direction(vector: ArrayLike, up: ArrayLike) -> str:
     """The axes that a direction goes along, the most first; up and down by name."""
-    along = np.asarray(vector) / np.linalg.norm(vector)
+    if not (length := np.linalg.norm(vector)):
+        return "all round"
+    along = np.asarray(vector) / length
     named = [
         k for k in np.argsort(-np.abs(along), kind="stable") if abs(along[k]) >= _TOLD
     ]
