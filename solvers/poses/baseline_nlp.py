@@ -68,7 +68,7 @@ def build_baseline_program(problem: BaselineProblem) -> BaselineProgram:
         _state_kept(covering, problem, cameras, slack[n_seams:])
     every = ca.vertcat(x, free, slack) if problem.elastic else x
     start = np.append(begin, problem.smallest_baseline)
-    if problem.elastic:
+    if problem.weights is not None:
         start = np.concatenate([start, problem.aims.ravel(), np.full(n_limits, _SLACK)])
         start[3 * k] = 0.0
         moved = ca.vertcat(x[: 3 * k] - begin, free - problem.aims.ravel())

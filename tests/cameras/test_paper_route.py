@@ -10,12 +10,14 @@ from support.factories import make_workspace
 from geometry.devices import PinholeModel
 from geometry.poses import look_at
 from planning.cameras.baselines.baseline_limits import BaselineLimits
+from planning.cameras.baselines.baseline_rows import check_seam
+from planning.cameras.baselines.hole_program import HoleTerms
 from planning.cameras.baselines.limit_poses import limit_poses
-from planning.cameras.baselines.seams import SampledSurface
+from planning.cameras.baselines.seams import SampledSurface, find_seams
 from planning.cameras.baselines.widest_baselines import BaselineSearch
 from planning.cameras.paper import hole_closing
 from planning.cameras.paper.paper_route import paper_route
-from planning.cameras.paper.route_problem import RouteProblem
+from planning.cameras.paper.route_problem import CameraSet, RouteProblem
 from planning.model.bodies import Box, Mount
 from planning.model.planned import PlannedCamera
 from planning.proofs.quotas import Quotas, RegionFloors
@@ -127,6 +129,38 @@ def side(half_height):
     azimuth, z = around(np.linspace(-half_height, half_height, 5))
     normals = np.column_stack([np.cos(azimuth), np.sin(azimuth), np.zeros(len(z))])
     return Body(RADIUS * normals + z[:, None] * UP, normals)
+
+
+def test_a_hole_is_where_a_part_ends_and_10_is_violated_until_it_is_closed():
+    """Two cameras 2.2 eta apart; each is to go on from where the other's part ends."""
+    body = band(np.radians(2.0), n=301, span=np.radians(60.0))
+    pair = (at(-1.1 * ETA), at(1.1 * ETA))
+    measured = body.measure(pair)
+    hole = ~measured.any(axis=1)
+    azimuth = np.arctan2(body.points[:, 1], body.points[:, 0])
+    limits = BaselineLimits(THETA, 0.0, workspace())
+    terms = HoleTerms(pair, measured, body.surface, hole, limits)
+    problem = body.problem(offered=ring(7))
+    closed = hole_closing.closed(problem, CameraSet(pair, measured), 4)
+    assert problem.short(closed) == 0
+    ends = list(terms.ends(np.zeros_like(measured, dtype=np.float64)))
+    assert {seam.cameras for seam in ends} == {(0, 1), (1, 0)}
+    for seam in ends:
+        one, two = seam.cameras
+        assert measured[seam.points, one].all()
+        sign = 2 * one - 1
+        np.testing.assert_allclose(
+            sign * azimuth[seam.points], 0.1 * ETA, atol=np.radians(0.8)
+        )
+        test = check_seam([pair[one], pair[two]], body.surface, seam, THETA)
+        assert np.all(test.slack < -0.15 * ETA)
+    seams = list(find_seams([(0, 1), (1, 0)], body.surface, closed.measured))
+    assert len(seams) == 2
+    for seam in seams:
+        both = [closed.cameras[c] for c in seam.cameras]
+        assert np.all(check_seam(both, body.surface, seam, THETA).slack > 0.0)
+    first, last = azimuths(closed.cameras)
+    assert last - first < 2.0 * ETA + np.radians(0.4)
 
 
 @pytest.mark.parametrize(("latitude", "count"), [(10.0, 4)])

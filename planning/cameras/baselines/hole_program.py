@@ -68,16 +68,14 @@ class HoleTerms:
         Samples that the program before lost, `lost`, are among those kept.
         """
         margins = np.column_stack([self._margins(camera) for camera in self.cameras])
-        hole = self.hole
-        past = np.where(margins > 0.0, -_HIDDEN, margins)
-        past[:, [bool(camera.existing) for camera in self.cameras]] = -np.inf
+        past = self.past(margins)
         owner, nearest = past.argmax(axis=1), past.max(axis=1)
         kept, weights = [np.zeros((0, 2), np.int64)], [np.zeros(0)]
         for c, samples in self._kept(margins, lost):
             kept.append(np.column_stack([np.full(len(samples), c), samples]))
             weights.append(np.where(np.isin(samples, lost), _DEMANDED, 1.0))
         for c in range(len(self.cameras)):
-            mine = np.flatnonzero(hole & (owner == c))
+            mine = np.flatnonzero(self.hole & (owner == c))
             some = mine[spread_points(self.surface.points[mine], _HOLE)]
             kept.append(np.column_stack([np.full(len(some), c), some]))
             each = len(mine) / max(len(some), 1)
@@ -88,11 +86,17 @@ class HoleTerms:
         return terms.elastic(
             aims,
             rolls,
-            self._ends(hole, owner),
+            self.ends(past),
             np.concatenate(kept),
             np.concatenate(weights),
             max_step,
         )
+
+    def past(self, margins: _Array) -> _Array:
+        """How far limits are past, as margins of 0 or less; inf for what stays."""
+        past = np.where(margins > 0.0, -_HIDDEN, margins)
+        past[:, [bool(camera.existing) for camera in self.cameras]] = -np.inf
+        return past
 
     def _kept(
         self, margins: _Array, lost: NDArray[np.int64]
@@ -107,14 +111,20 @@ class HoleTerms:
             n = _KEPT + len(first)
             yield c, mine[spread_points(self.surface.points[mine], n, first)]
 
-    def _ends(self, hole: _Mask, owner: NDArray[np.int64]) -> Iterator[Seam]:
-        """Where a part ends beside what another camera is to take over."""
-        for two in np.unique(owner[hole]).tolist():
-            for one in range(len(self.cameras)):
-                parts = np.column_stack([self.measured[:, one], hole & (owner == two)])
+    def ends(self, past: _Array) -> Iterator[Seam]:
+        """Where a part ends beside what another camera is to take over.
+
+        That is the one nearest to measuring it, `past` its limits by so much, (n, k).
+        """
+        for one in range(len(self.cameras)):
+            others = past.copy()
+            others[:, one] = -np.inf
+            nearest = np.where(self.hole, others.argmax(axis=1), -1)
+            for two in np.unique(nearest[self.hole & (others.max(axis=1) > -np.inf)]):
+                parts = np.column_stack([self.measured[:, one], nearest == two])
                 seam = find_seam((0, 1), self.surface, parts)
-                if one != two and seam.shares_border:
-                    yield replace(seam, cameras=(one, two))
+                if seam.shares_border:
+                    yield replace(seam, cameras=(one, int(two)))
 
     def _margins(self, camera: PlannedCamera) -> _Array:
         """What the tightest limit of a camera leaves of each sample, (n,).

@@ -26,7 +26,7 @@ from planning.cameras.camera_cover import (
 )
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.proofs.selection import Selection
+from planning.proofs.selection import CandidateCover, Selection
 from planning.scene.camera_views import CandidateViews
 from planning.scene.draws import DRAWS
 from planning.scene.measured import LitSamples, measured_by, taken
@@ -133,7 +133,8 @@ def route_among(
     few = taken(samples, some, samples.lit)
     reachable = np.any(measured[some], axis=1)
     on = BaselineSamples(scene, projectors, few)
-    route = paper_route(_route_problem(on, candidates, measured[some]))
+    cover = candidate_cover(scene, measured[some], few)
+    route = paper_route(route_problem(on, candidates, cover))
     if not route.by_count:
         raise InfeasibleLimitsError(
             "the paper's route found no camera that measures a lit sample, though "
@@ -174,10 +175,11 @@ def _judged(
     return RouteCameras(candidates, measured, by_count, next(enough, None), without)
 
 
-def _route_problem(
-    on: BaselineSamples, candidates: CandidateViews, measured: NDArray[np.bool_]
+def route_problem(
+    on: BaselineSamples, candidates: CandidateViews, cover: CandidateCover
 ) -> RouteProblem:
-    scene, n = on.scene, n_fixed(on.scene)
+    """Return the route's problem on samples, which candidates cover as stated."""
+    scene, n = on.scene, cover.n_existing
     least_lit = on.count_lit(candidates.cameras[:n])
     none = np.zeros((len(on.lit.target), 0), dtype=bool)
 
@@ -193,10 +195,10 @@ def _route_problem(
         on.surface,
         baseline_limits(scene),
         candidates.cameras,
-        measured,
+        cover.covers,
         together,
         widen,
-        candidate_cover(scene, measured, on.lit).quotas,
+        cover.quotas,
         n,
         on.rings,
     )

@@ -232,11 +232,81 @@ def test_the_smallest_of_several_baselines_is_raised():
     assert solution.smallest_baseline == pytest.approx(np.sqrt(3.0), rel=1e-5)
 
 
+def test_elastic_cameras_close_a_hole_at_d_max():
+    """1.1 eta to either side of the hole: (10) is violated at both ends, then just met.
+
+    Of what closes the hole the nearest is taken: the baseline ends at 2 S sin(eta).
+    """
+    limit = round_body_limit(RADIUS, RING, THETA)
+    apart = 1.1 * limit.half_angle
+    start = replace(_round_body(apart, apart), weights=np.ones(2))
+    solution = solve_baseline(start)
+    assert solution.status is SolveStatus.LOCALLY_OPTIMAL
+    d = np.linalg.norm(np.subtract(*solution.centres))
+    assert np.linalg.norm(np.subtract(*start.centres)) > 1.05 * limit.d_max
+    assert d == pytest.approx(limit.d_max, rel=2e-3)
+    np.testing.assert_allclose(solution.slack, 0.0, atol=1e-3)
+    # A hole that cameras can't come near enough to leaves what they can't do.
+    held = solve_baseline(replace(start, max_step=0.02))
+    assert held.slack.sum() > 0.05
+
+
+def test_elastic_cameras_turn_to_what_is_outside_their_image():
+    """A point 20 degrees off an axis, a field of 10 to either side, no room to move."""
+    point = np.array([RADIUS, 0.0, 0.0])
+    centre = np.array([RING, 0.0, 0.0])
+    aim = centre + (RING - RADIUS) * np.array(
+        [-np.cos(np.radians(20.0)), np.sin(np.radians(20.0)), 0.0]
+    )
+    side = np.tan(np.radians(10.0))
+    kept = _kept([0], [point], [[1.0, 0.0, 0.0]])
+    problem = _problem(
+        [centre],
+        aims=aim[None],
+        kept=kept,
+        sides=side * np.array([[-1.0, -1.0], [1.0, 1.0]]),
+        pairs=np.zeros((0, 2), dtype=np.int64),
+        shell=PositionShell(np.zeros(3), (RING, RING), Z, 1e-3, Z),
+        weights=np.ones(1),
+    )
+    problem = replace(problem, shell=replace(problem.shell, axis=centre / RING))
+    solution = solve_baseline(problem)
+    (turned,), (stands,) = solution.aims, solution.centres
+    axis = (turned - stands) / np.linalg.norm(turned - stands)
+    ray = (point - stands) / np.linalg.norm(point - stands)
+    assert np.degrees(np.arccos(axis @ ray)) == pytest.approx(10.0, abs=0.1)
+    assert np.linalg.norm(stands - centre) < 2e-3
+
+
+@pytest.mark.parametrize("heavy", [0, 1])
+def test_what_weighs_less_gives_way(heavy):
+    """One camera can't see two points that face apart."""
+    normals = np.array([_on_ring(-1.2, 1.0), _on_ring(1.2, 1.0)])
+    problem = _problem(
+        [_on_ring(0.0)],
+        kept=_kept([0, 0], RADIUS * normals, normals),
+        pairs=np.zeros((0, 2), dtype=np.int64),
+        weights=np.where(np.arange(2) == heavy, 5.0, 1.0),
+    )
+    slack = solve_baseline(problem).slack
+    assert slack[heavy] == pytest.approx(0.0, abs=1e-4)
+    assert slack[1 - heavy] > 0.1
+
+
+def test_derivatives_of_the_elastic_program_agree_with_finite_differences():
+    kept = _kept([0, 1], [[RADIUS, 0.01, 0.02]] * 2, [[1, 0, 0]] * 2)
+    problem = replace(_round_body(0.5, 0.6), kept=kept, rolls=np.array([0.3, -0.2]))
+    _check_derivatives(replace(problem, weights=np.ones(4)))
+
+
 def test_derivatives_agree_with_finite_differences():
     kept = _kept(
         [0, 1], [[RADIUS, 0.01, 0.02]] * 2, [[1, 0, 0]] * 2, rings=[[0, 1.0, 0]] * 2
     )
-    problem = replace(_round_body(0.5, 0.6), kept=kept)
+    _check_derivatives(replace(_round_body(0.5, 0.6), kept=kept))
+
+
+def _check_derivatives(problem):
     program = build_baseline_program(problem)
     both = ca.vertcat(program.objective, program.constraints)
     value = ca.Function("g", [program.x], [both])
