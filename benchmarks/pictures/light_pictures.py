@@ -79,9 +79,8 @@ def candidates(job: Job) -> Image.Image:
 def rings(job: Job) -> Image.Image:
     """A frame of P1's code, and its rings where they fall on the object."""
     assert job.plan
-    frames = sorted((job.folder / "patterns").rglob("*P1*/*.png"))
-    frames = frames or sorted((job.folder / "patterns").rglob("P1*.png"))
-    frame = Image.open(frames[2 * len(frames) // 3]).convert("RGB").resize((640, 480))
+    (finest,) = (job.folder / "patterns" / "P1").glob("*bit0.png")
+    frame = Image.open(finest).convert("RGB").resize((640, 480))
     projector = job.plan.projectors[0]
     local = transform(inverse(projector.world_from_ring), job.mesh.face_centroids)
     radius = np.hypot(local[:, 0], local[:, 1]) / local[:, 2]

@@ -34,7 +34,7 @@ _ARROW = 0.045
 
 
 def false_projection(job: Job) -> Image.Image:
-    """Fig. 1: the last of P1's rings that mostly land, where it does and doesn't.
+    """Fig. 1: of P1's rings the one of which about half lands, where it does.
 
     And where P1's light runs along the tangent or grazes: what eq. (2) forbids.
     """
@@ -43,7 +43,7 @@ def false_projection(job: Job) -> Image.Image:
     rays = _rays(projector)
     hits = [_landed(job, place, ring) for ring in rays]
     share = np.array([np.isfinite(reach).mean() for reach in hits])
-    ring = int(np.argmax(share))
+    ring = int(np.argmin(np.abs(share - 0.5)))
     depth = float(np.linalg.norm(job.mesh.centre - place))
     reach = np.where(np.isfinite(hits[ring]), hits[ring], depth)
     points = place + reach[:, None] * rays[ring]
@@ -57,8 +57,7 @@ def false_projection(job: Job) -> Image.Image:
     back = _towards(place, job)
     _arrow(panel, job.mesh.centre + 0.15 * back, back, "L", ORANGE)
     panel.heading(
-        f"(a) ring {ring + 1} of {len(rays)} of P1: {share[ring]:.0%} lands (blue); "
-        "the rest passes it by"
+        f"(a) ring {ring + 1} of {len(rays)} of P1: {share[ring]:.0%} lands (blue)"
     )
     panel.scale_bar(size=13.0)
     return beside_each_other(finished(panel), _tangents(job, projector, limits))
