@@ -266,9 +266,7 @@ def _figures(plan: RigPlan, result: Reconstruction) -> list[str]:
     )
     missing = complete.predicted_missing
     lines = [
-        f"merged    {result.n_merged} points of {result.n_points}, "
-        f"{result.redundant_fraction - result.step_fraction:.1%} redundant, "
-        f"{result.step_fraction:.1%} false at steps",
+        f"merged    {result.merging}",
         "accuracy against the mesh: "
         f"{error_words(accuracy.rms_m, accuracy.p95_m, accuracy.bias_m, limits)}, "
         f"max {1e3 * accuracy.max_m:.3f}",

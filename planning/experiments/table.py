@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from planning.verify.reconstruction.calibration import DeviceCalibration
+from planning.verify.reconstruction.check.accuracy import share_of
 
 from .ground_truth import Errors, LabelCount, MeasuredErrors
 from .paper_devices import CAMERA_PX, PROJECTOR_PX
@@ -91,6 +92,7 @@ def outcome_lines(outcome: Outcome, both: MeasuredErrors | None = None) -> list[
         f"{_MM * outcome.experiment.gap_m:.1f} mm; lengths in mm",
         "",
         *cloud_lines(outcome.clouds),
+        f"merged: {outcome.reconstruction.merging}",
         "",
         *ring_lines(outcome),
         *([] if outcome.labels is None else ["", label_line(outcome.labels)]),
@@ -134,6 +136,8 @@ def outcome_document(
         "observable_share": outcome.visible,
         "labels": None if outcome.labels is None else vars(outcome.labels),
         "clouds": [_cloud_document(one) for one in outcome.clouds],
+        "overlap_share": share_of(outcome.reconstruction.merged.shared),
+        "step_share": outcome.reconstruction.step_fraction,
         "rings": [
             vars(ring) | {"errors": vars(outcome.errors_of(ring))}
             for ring in outcome.outcomes

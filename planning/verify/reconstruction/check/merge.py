@@ -92,20 +92,19 @@ def merge(
     side = int(np.clip(np.ceil(pitch_px), _MIN_TILE_PX, _MAX_TILE_PX))
     for camera in np.unique(cloud.camera[~steps]):
         seen = np.flatnonzero((cloud.camera == camera) & ~steps)
-        by_camera = fitted.take(seen)
-        normals[seen] = _plane_normals(by_camera, _Tiles.of(by_camera.pixels, side))
+        tiles = _Tiles.of(cloud.pixels[seen], side)
+        normals[seen] = _plane_normals(fitted.points[seen], cloud.rays[seen], tiles)
     # In a step there is no surface whose normal would make an error less.
     largest = np.linalg.norm(fitted.shift, axis=1) * fitted.noise_px
     sigma = np.where(doubtful, largest, fitted.sigma(normals))
 
     stays = ~(steps | redundant)
+    size = pixel_sizes(cloud, plan)
     for side_px, ratio in (_SPOT_PX, 1.0), (_PLACE * pitch_px, _MUCH_WORSE):
         both = np.flatnonzero(stays & shared)
-        overlap = fitted.take(both)
-        cell_m = (
-            side_px * float(np.median(pixel_sizes(overlap, plan))) if len(both) else 1.0
-        )
-        stays[both] = _good_projectors(overlap, sigma[both], cell_m, ratio)
+        if len(both):
+            cell_m = side_px * float(np.median(size[both]))
+            stays[both] = _good_projectors(fitted, both, sigma, cell_m, ratio)
     return Merged(
         fitted.take(stays), stays, steps, shared, normals[stays], sigma[stays]
     )
@@ -123,20 +122,25 @@ def _sharpness(cloud: Cloud) -> Array:
     return sharpness
 
 
-def _good_projectors(cloud: Cloud, sigma: Array, cell_m: float, ratio: float) -> Mask:
-    """Points of the best projector in each cell of a camera, or about as sure, (n,)."""
-    if len(cloud) == 0:
-        return np.zeros(0, dtype=bool)
-    x, y, z = np.floor((cloud.points - cloud.points.min(axis=0)) / cell_m).T
+def _good_projectors(
+    cloud: Cloud, some: Indices, sigma: Array, cell_m: float, ratio: float
+) -> Mask:
+    """Which of some points are of the best projector in their cell, or about as sure.
+
+    Cells are cubes in space, of each camera its own.
+    """
+    points, camera = cloud.points[some], cloud.camera[some]
+    projector, sigma = cloud.projector[some], sigma[some]
+    x, y, z = np.floor((points - points.min(axis=0)) / cell_m).T
     key = (x * (y.max() + 1.0) + y) * (z.max() + 1.0) + z
-    key = key * (cloud.camera.max() + 1.0) + cloud.camera
+    key = key * (camera.max() + 1.0) + camera
     # Without a normal a point gives way to any other.
     known = np.where(np.isfinite(sigma), sigma, np.inf)
     order = np.lexsort((known, key))
     first = np.flatnonzero(np.diff(key[order], prepend=-1.0))
-    best = np.empty(len(cloud), dtype=np.int64)
+    best = np.empty_like(order)
     best[order] = np.repeat(order[first], np.diff(first, append=len(order)))
-    good = cloud.projector == cloud.projector[best]
+    good = projector == projector[best]
     return good | ((ratio > 1.0) & (known <= ratio * known[best]))
 
 
@@ -164,9 +168,9 @@ class _Tiles:
         return (wide[:, :-2] + wide[:, 1:-1] + wide[:, 2:]).ravel()
 
 
-def _plane_normals(cloud: Cloud, tiles: _Tiles) -> Array:
+def _plane_normals(points: Array, rays: Array, tiles: _Tiles) -> Array:
     """Normals of the planes through the points around each point's tile, (n, 3)."""
-    points = cloud.points - cloud.points.mean(axis=0)
+    points = points - points.mean(axis=0)
     count = tiles.sum_around()
     safe = np.maximum(count, 1.0)
     mean = np.stack([tiles.sum_around(points[:, a]) for a in range(3)], axis=1)
@@ -179,5 +183,5 @@ def _plane_normals(cloud: Cloud, tiles: _Tiles) -> Array:
     values, vectors = np.linalg.eigh(spread)
     flat = (count >= _MIN_POINTS) & (values[:, 1] > _MIN_SPREAD * values[:, 2])
     normals = np.where(flat[:, None], vectors[:, :, 0], np.nan)[tiles.of_point]
-    away = np.einsum("ij,ij->i", normals, cloud.rays) > 0.0
+    away = np.einsum("ij,ij->i", normals, rays) > 0.0
     return np.where(away[:, None], -normals, normals)

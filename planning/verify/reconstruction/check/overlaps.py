@@ -33,6 +33,7 @@ def compare_overlaps(
     """
     shared, crossed, differs = (np.zeros(len(cloud), dtype=bool) for _ in range(3))
     size = pixel_sizes(cloud, plan)
+    noise = np.linalg.norm(cloud.shift, axis=1) * cloud.noise_px
     for (q, c), image in lit.items():
         doubt_px = _noise_px(cloud, q, c)
         others = np.flatnonzero((cloud.camera == c) & (cloud.projector != q))
@@ -42,12 +43,11 @@ def compare_overlaps(
         known = low >= 0
         others, low, high = others[known], low[known], high[known]
         shared[others] = True
-        points = cloud.take(others)
-        projector = plan.projectors[q]
-        depth = projector.to_ring(points.points)[:, 2]
-        away = projector.ring_coordinate(points.points)
+        projector, points = plan.projectors[q], cloud.points[others]
+        depth = projector.to_ring(points)[:, 2]
+        away = projector.ring_coordinate(points)
         slack = (_BESIDE_PX + _SIGMAS * doubt_px) * size[others]
-        slack += _SIGMAS * np.linalg.norm(points.shift, axis=1) * points.noise_px
+        slack += _SIGMAS * noise[others]
         slack *= projector.light.shrink(depth)
         radii = projector.pattern.radii
         outside = _beyond(away, radii, low, high) > slack

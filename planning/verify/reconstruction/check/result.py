@@ -12,7 +12,7 @@ from planning.verify.reconstruction.decode.decode import Decoded, PairIndex
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.scanner import Scanner
 
-from .accuracy import Accuracy, Completeness
+from .accuracy import Accuracy, Completeness, share_of
 from .comparison import Comparison
 from .merge import Merged
 
@@ -92,7 +92,18 @@ class Reconstruction:
     @property
     def step_fraction(self) -> float:
         """Share of the points that were left out as edges between surfaces."""
-        return float(self.merged.steps.mean()) if self.n_points else 0.0
+        return share_of(self.merged.steps)
+
+    @property
+    def merging(self) -> str:
+        """What merging did, in words."""
+        shared = share_of(self.merged.shared)
+        redundant = self.redundant_fraction - self.step_fraction
+        return (
+            f"{self.n_merged} points of {self.n_points}, {shared:.1%} of them in the "
+            f"light of two projectors; {redundant:.1%} redundant, "
+            f"{self.step_fraction:.1%} false at steps"
+        )
 
     def record(self) -> ReconstructionRecord:
         """Return the `reconstruction` part of a plan."""
