@@ -11,7 +11,7 @@ from planning.verify.reconstruction.check.accuracy import (
     measure_accuracy,
     measure_completeness,
 )
-from planning.verify.reconstruction.check.merge import merge
+from planning.verify.reconstruction.check.merge import Merged, merge
 from planning.verify.reconstruction.check.overlaps import pixel_sizes
 from planning.verify.reconstruction.check.result import PairCount, Reconstruction
 from planning.verify.reconstruction.decode.decode import Pairs
@@ -22,6 +22,7 @@ from planning.verify.reconstruction.faults.measured_clouds import (
 )
 from planning.verify.reconstruction.patterns.second_sequence import (
     both_sequences,
+    numbered,
     second_sequence,
 )
 from planning.verify.reconstruction.render.photometry import Photometry, assumed_light
@@ -102,40 +103,47 @@ def reconstruct_twice(
     second sequence's noise is another.
     """
     light, stands = photometry or assumed_light(plan), mounted or plan
-    pairs: list[Pairs] = []
-    second, first = plan, None
-    for turn in (0, 1):
-        spent = Spent()
-        pairs.append(
-            decode_rendered(
-                second,
-                stands,
-                light,
-                seed=seed + turn,
-                threads=threads,
-                progress=progress,
-                spent=spent,
-                believed=_ringed(stands, second),
-            )
+    if expected is None:
+        expected = _fresh(plan, seed)
+
+    def measure(design: Scanner, turn: int) -> tuple[Pairs, Reconstruction]:
+        spent, rig = Spent(), _ringed(stands, design)
+        decoded = decode_rendered(
+            design,
+            stands,
+            light,
+            seed=seed + turn,
+            threads=threads,
+            progress=progress,
+            spent=spent,
+            believed=rig,
         )
-        if first is None:
-            first = conclude(
-                stands,
-                pairs[0],
-                seed=seed,
-                expected=expected,
-                photometry=light,
-                spent=spent,
-            )
-            second = second_sequence(stands, first.everything)
-    assert first is not None
-    rig, places = both_sequences(stands, second)
-    decoded = [
-        (pair, one.with_rings(own[pair[0]]))
-        for sequence, own in zip(pairs, places, strict=True)
+        return decoded, conclude(
+            rig,
+            decoded,
+            seed=seed,
+            expected=expected,
+            photometry=light,
+            spent=spent,
+        )
+
+    decoded, first = measure(plan, 0)
+    second = second_sequence(stands, first.everything)
+    more, again = measure(second, 1)
+    rig, (before, after) = both_sequences(stands, second)
+    pairs = [
+        (pair, one.with_rings(places[pair[0]]))
+        for sequence, places in ((decoded, before), (more, after))
         for pair, one in sequence
     ]
-    both = conclude(rig, decoded, seed=seed, expected=expected, photometry=light)
+    # Each without its redundancy: rings of different places don't repeat each other.
+    merged = replace(
+        first.merged.joined(again.merged),
+        cloud=Cloud.join(
+            [numbered(first.merged.cloud, before), numbered(again.merged.cloud, after)]
+        ),
+    )
+    both = _judged(rig, pairs, merged, expected.within(plan.target), light, Spent())
     return BothSequences(first, second, both)
 
 
@@ -159,17 +167,35 @@ def conclude(
 
     Without photometry the images were taken. The time of merging is added to `spent`.
     """
-    if expected is None:
-        mesh, target = plan.mesh, plan.target
-        fresh = sample_surface(mesh, _DEFAULT_SAMPLES, seed=seed, within=target)
-        expected = Expected(fresh)
-    expected = expected.within(plan.target)
-    spent = spent or Spent()
-    everything = Cloud.join([pair.cloud.of_devices(p, c) for (p, c), pair in decoded])
+    expected = expected or _fresh(plan, seed)
+    spent, everything = spent or Spent(), _everything(decoded)
     with spent.on("merge"):
         lit = {pair: gave.lit for pair, gave in decoded}
         merged = merge(everything, plan, lit, pitch_px=_ring_pitch(plan, everything))
-    limits = plan.limits.check
+    within = expected.within(plan.target)
+    return _judged(plan, decoded, merged, within, photometry, spent)
+
+
+def _fresh(plan: Scanner, seed: int) -> Expected:
+    """Points of the target that nobody says anything of."""
+    mesh, target = plan.mesh, plan.target
+    return Expected(sample_surface(mesh, _DEFAULT_SAMPLES, seed=seed, within=target))
+
+
+def _everything(decoded: Pairs) -> Cloud:
+    return Cloud.join([pair.cloud.of_devices(p, c) for (p, c), pair in decoded])
+
+
+def _judged(
+    plan: Scanner,
+    decoded: Pairs,
+    merged: Merged,
+    expected: Expected,
+    photometry: Photometry | None,
+    spent: Spent,
+) -> Reconstruction:
+    """Hold what was merged against the object and the limits, and seek causes."""
+    limits, everything = plan.limits.check, _everything(decoded)
     completeness = measure_completeness(
         everything, merged.cloud, expected, limits.tau_m
     )

@@ -7,7 +7,7 @@ that nothing confirms, go; what several cameras measured of a ring is one curve.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -57,6 +57,12 @@ class Merged:
     shared: Mask
     normals: Array
     sigma: Array
+
+    def joined(self, other: "Merged") -> "Merged":
+        """Return the points of both, of sequences that measured different places."""
+        pairs = ((getattr(one, f.name) for one in (self, other)) for f in fields(self))
+        clouds, *columns = map(tuple, pairs)
+        return Merged(Cloud.join(clouds), *map(np.concatenate, columns))
 
 
 def merge(
