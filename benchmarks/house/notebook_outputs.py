@@ -21,7 +21,7 @@ from PIL import Image
 
 NOTEBOOKS = Path(__file__).resolve().parents[2] / "notebooks"
 _OF_THIS_MACHINE = re.compile(r"/(tmp|home|root|work|usr)/|\b0x[0-9a-f]{6}|Warning")
-_WIDEST, _MOST_BYTES = 900, 320_000
+_WIDEST, _MOST_BYTES = 760, 320_000
 
 
 def main() -> int:
@@ -66,9 +66,8 @@ def _shrink(data: dict[str, Any]) -> None:
         height = round(picture.height * _WIDEST / picture.width)
         picture = picture.resize((_WIDEST, height), Image.Resampling.LANCZOS)
     file = io.BytesIO()
-    # Thin coloured lines need their colours in full resolution.
     picture.convert("RGB").save(
-        file, format="JPEG", quality=70, optimize=True, subsampling=0
+        file, "JPEG", quality=60, subsampling=1, optimize=True, progressive=True
     )
     data.clear()
     data["image/jpeg"] = base64.b64encode(file.getvalue()).decode()
