@@ -96,9 +96,9 @@ print(f"{np.abs(np.column_stack([u / w, v / w]) - own.pixels).max():.1e} px")
 #
 # Eq. (6) should read $Y_2 = J y_2$: points in the frame of the second projector come
 # into that of the first. Poses are known here, so $J$ is, and all clouds are in one
-# frame. $Y = Y_1 + Y_2 - (Y_1 \cap Y_2)$, eq. (7): where both projectors light the
-# surface, the one that meets it more squarely stays, then the camera that measures more
-# exactly.
+# frame. $Y = Y_1 + Y_2 - (Y_1 \cap Y_2)$, eq. (7): where clouds overlap is found from
+# the light in the images and confirmed by geometry. What several cameras measured of a
+# ring is one curve; a point at a step that nothing confirms goes.
 
 # %%
 first, second = outcome.experiment.scanner.projectors
