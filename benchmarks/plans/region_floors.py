@@ -12,7 +12,8 @@ fresh samples and those that small regions get of their own), and processor seco
 
 A plan whose worst region has the next floor too is its plan as well: as few as it has
 are enough, and no floor that is higher needs fewer. Such a row says "as before". Last
-comes, for each floor, how many meshes it costs a projector.
+comes, for each floor, how many meshes it costs a projector: those that need one more,
+and those of which the fresh samples miss it, since a plan then gets one more.
 """
 
 import argparse
@@ -75,7 +76,10 @@ def main() -> int:
             print(_row(name, regions, floor, before, again), flush=True)
     print("\n| F | costs a projector on |\n|---|---|")
     for floor in sorted(given.floors):
-        dearer = sum(found[floor].count > found[0.0].count for found in every)
+        dearer = sum(
+            found[floor].count > found[0.0].count or found[floor].worst < floor
+            for found in every
+        )
         print(f"| {floor:g} | {dearer} of {len(every)} |")
     return 0
 

@@ -4,12 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 
 from solvers import CoverProblem, SolveStatus, solve_cover
 from solvers.covers.bounds.mixed_integer import branch_and_bound
 from solvers.covers.bounds.reductions import reduce_problem
-from solvers.covers.bounds.relaxation import cost_bound, count_bound
+from solvers.covers.bounds.relaxation import cost_bound, count_bound, least_service
 from solvers.covers.cover import solve_max_coverage
+from solvers.covers.search.prices import Prices
 from solvers.status import WorkBudget
 
 
@@ -76,6 +78,36 @@ def test_counts_and_weights_equal_brute_force(seed):
         assert cost_bound(cover, lam) <= needed - problem.fixed.size + 1e-9
     exact = branch_and_bound(cover, np.arange(cover.n_sets), WorkBudget(1e12))
     assert exact.bound == pytest.approx(needed - problem.fixed.size, abs=1e-4)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_least_service_is_that_of_a_linear_program(seed):
+    cover = reduce_problem(floored(seed))
+    lam = np.random.default_rng(seed).random(cover.weights.size)
+    groups = cover.row_sets == np.arange(cover.quotas.size)[:, None]
+    asked = np.vstack([groups * cover.weights, cover.weights])
+    needed = np.append(cover.quotas, cover.quota)
+    unit = cover.weights.max()
+    cheapest = linprog(lam, -asked / unit, -needed / unit, bounds=(0, 1))
+    assert least_service(cover, lam) == pytest.approx(cheapest.fun, rel=1e-7)
+
+
+def test_prices_ask_of_what_meets_the_floors_no_more_than_it_has():
+    # Rows 0 to 3 and 4 to 7; floors of two rows each.
+    covers = np.eye(8, dtype=bool)
+    sets = np.repeat([0, 1], 4)
+    problem = CoverProblem(
+        covers, required_weight=[2, 2], required_total=5, row_sets=sets
+    )
+    cover = reduce_problem(problem)
+    prices = replace(Prices.even(cover), of_sets=np.array([16.0, 80.0]))
+    for chosen in ([0, 1, 4, 5], [0, 1, 2, 4, 5], [0, 1, 4, 5, 6, 7], [4, 5, 6, 7]):
+        chosen = np.array(chosen)
+        weight, priced = cover.weight_of(chosen), prices.priced.weight_of(chosen)
+        beyond = float((cover.covered_by(chosen) - cover.quotas)[1])
+        # What a floor is exceeded by counts, at what it costs more than one.
+        assert priced == prices.demand(weight) + 64.0 * beyond
+        assert prices.weight(priced) == weight + 4.0 * beyond >= weight
 
 
 def test_a_floor_costs_a_set_that_the_total_does_not():
