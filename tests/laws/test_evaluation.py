@@ -24,7 +24,9 @@ FEW = (
 
 def made(mesh, rig, **changes):
     """The plan, whether or not a requirement is missed."""
+    # About centred axes a blind curve would take its share of what closed forms say.
     asked = {"max_projectors": None, "target": "surface", "check": False}
+    asked |= {"ring_axis": "free"}
     try:
         return plan_rig(mesh, rig, **(asked | changes))
     except RequirementError as missed:
