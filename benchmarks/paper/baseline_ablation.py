@@ -291,6 +291,7 @@ def _before(name: str, tree: Path, projectors: Path) -> dict[str, Any]:
 def _old(projectors: Path, name: str) -> int:
     """Print what the code of OLD, which is the one imported here, finds."""
     from planning.cameras.baselines.limit_poses import limit_poses
+
     from planning.cameras.baselines.widest_baselines import WidestBaselines
     from planning.cameras.camera_cover import candidate_cover
     from planning.cameras.paper import one_fewer_camera, paper_cameras, paper_route

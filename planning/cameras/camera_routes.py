@@ -1,8 +1,8 @@
 """Which route to the cameras is taken: the cover's, the paper's, or the better of both.
 
-Both get the same projectors and ring axes. Where the paper's route, or poses at the
-limit (10) of the cover's own cameras, need fewer, they join the candidates and the
-cover is solved again, so that what is proved is proved over a set that holds them.
+Both get the same projectors and ring axes. Where the paper's route needs fewer, its
+cameras join the candidates and the cover is solved again, so that what is proved is
+proved over a set that holds them.
 Where both need as many and the paper's measure no less, those stay whose scan is
 cheaper by eq. (8); else the cover's, unless the paper's baselines are clearly larger.
 """
@@ -13,8 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.cameras.baselines.limit_poses import limit_poses
-from planning.cameras.baselines.seams import SampledSurface, overlap_components
+from planning.cameras.baselines.seams import overlap_components
 from planning.cameras.baselines.widest_baselines import WidestBaselines
 from planning.cameras.paper.paper_cameras import (
     RouteCameras,
@@ -27,14 +26,10 @@ from planning.model.document.certificates import CamerasBy, RouteCounts
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.selection import fewest_count
-from planning.scene.bodies.clearance import with_clearance
 from planning.scene.camera_views import CandidateViews
-from planning.scene.draws import DRAWS
-from planning.scene.measured import measured_by
 from planning.scene.scene import Scene
 
 from .camera_baselines import (
-    baseline_limits,
     baseline_samples,
     held_to_candidates,
     widen_baselines,
@@ -200,47 +195,25 @@ def _with_more(
     cover: CameraCover,
     route: RouteCameras | None,
 ) -> CameraCover:
-    """Return the cover over more candidates where they save a camera, else as it was.
+    """Return the cover over the route's cameras, too, where they save a camera.
 
-    More candidates alone are no better plan. They are the cameras of the paper's route,
-    and poses at the limit (10) of the cover's.
+    More candidates alone are no better plan.
     """
     needed = cover.selection.needed
-    if needed <= n_fixed(scene) + 1:
+    if route is None or needed <= n_fixed(scene) + 1:
         return cover
-    wider = cover if route is None else route
-    candidates, measured = wider.candidates, wider.measured
-    limit = _at_limit(scene, cover)
-    if limit:
-        theirs = measured_by(scene, limit, cover.samples)
-        measured = np.concatenate([measured, theirs], axis=1)
-        candidates = candidates.joined(limit)
     known = None
-    if route is not None and route.needed is not None and route.needed < needed:
+    if route.needed is not None and route.needed < needed:
         known = route.by_count[route.needed]
-    elif needed <= fewest_count(candidate_cover(scene, measured, cover.samples)):
+    elif needed <= fewest_count(candidate_cover(scene, route.measured, cover.samples)):
         return cover
-    again = cover_by_cover(scene, projectors, candidates, known)
+    again = cover_by_cover(scene, projectors, route.candidates, known)
     if again.selection.needed < needed:
         return again
-    if again.has_bodies and route is not None and known is not None:
+    if again.has_bodies and known is not None:
         # Completed from the cover's side they were in each other's way, but not so.
         return cover_of(scene, projectors, cover.samples, route)
     return cover
-
-
-def _at_limit(scene: Scene, cover: CameraCover) -> tuple[PlannedCamera, ...]:
-    """Poses at d_max from each neighbour among the cover's cameras."""
-    n = len(cover.samples.target)
-    some = np.arange(0, n, -(-n // DRAWS.routes))
-    samples = cover.samples.target.take(some).samples
-    poses = limit_poses(
-        cover.cameras,
-        SampledSurface(samples.points, samples.normals),
-        cover.measured[np.ix_(some, cover.selection.chosen)],
-        baseline_limits(scene),
-    )
-    return with_clearance(scene, poses)
 
 
 def _compared(

@@ -49,7 +49,6 @@ class Draws:
     relaxations: Draw = Draw(800, 950)
     dark: int = 400
     fewer_devices: int = 2000
-    routes: int = 2000
     paper_route: int = 1500
     axis_program: int = 250
 

@@ -12,13 +12,11 @@ from geometry.poses import look_at
 from planning.cameras.baselines.baseline_limits import BaselineLimits
 from planning.cameras.baselines.baseline_rows import check_seam
 from planning.cameras.baselines.hole_program import HoleTerms
-from planning.cameras.baselines.limit_poses import limit_poses
 from planning.cameras.baselines.seams import SampledSurface, find_seams
 from planning.cameras.baselines.widest_baselines import BaselineSearch
 from planning.cameras.paper import hole_closing
 from planning.cameras.paper.paper_route import paper_route
 from planning.cameras.paper.route_problem import CameraSet, RouteProblem
-from planning.model.bodies import Box, Mount
 from planning.model.planned import PlannedCamera
 from planning.proofs.quotas import Quotas, RegionFloors
 
@@ -230,51 +228,3 @@ def test_cameras_that_stand_already_stay_and_count():
     np.testing.assert_array_equal(
         route.cameras.cameras[0].world_from_device, given.world_from_device
     )
-
-
-def test_a_pose_at_the_limit_just_reaches_the_seam():
-    """d = 2 S sin(eta) on a round body; a degree beyond leaves a gap, within none."""
-    body = band(np.radians(2.0), n=1441, span=np.radians(110.0))
-    limits = BaselineLimits(THETA, 0.0, workspace())
-    for apart in (1.2, 1.7):
-        pair = [at(-apart / 2), at(apart / 2)]
-        found = limit_poses(
-            pair, body.surface, body.measure(pair), limits, only=1, shares_past=(0.0,)
-        )
-        (moved,) = found
-        d = np.linalg.norm((moved.world_from_device - pair[0].world_from_device)[:3, 3])
-        assert d == pytest.approx(2.0 * np.sin(ETA), rel=3e-3)
-        turn = azimuths([moved])[0]
-        inside = np.abs(np.arctan2(body.points[:, 1], body.points[:, 0])) < 0.8
-        for beyond, whole in ((-np.radians(1.0), True), (np.radians(1.0), False)):
-            seen = body.measure([pair[0], at(turn + beyond)]).any(axis=1)
-            assert seen[inside].all() == whole
-
-
-def test_a_pose_at_the_limit_keeps_the_workspace_and_what_stands_already():
-    body = band(np.radians(2.0), span=np.radians(110.0))
-    pair = [at(-0.6), at(0.6)]
-    seen = (body.surface, body.measure(pair))
-    axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    wall = Box("wall", (0.0, 1.0, 0.0), (2.0, 0.3, 2.0), axes)
-    barred = BaselineLimits(THETA, 0.0, workspace(keep_out=(wall,)))
-    free = BaselineLimits(THETA, 0.0, workspace())
-    assert len(limit_poses(pair, *seen, free, shares_past=(0.0,))) == 2
-    (one,) = limit_poses(pair, *seen, barred, shares_past=(0.0,))
-    assert azimuths([one])[0] < 0.0
-    fixed = [replace(pair[0], existing="old"), pair[1]]
-    (other,) = limit_poses(fixed, *seen, free, shares_past=(0.0,))
-    assert azimuths([other])[0] > 0.0
-
-
-def test_a_pose_at_the_limit_is_one_that_the_mount_can_be_set_to():
-    body = band(np.radians(2.0), span=np.radians(110.0))
-    pair = [at(-0.6), at(0.6)]
-    clicks = workspace(camera_mount=Mount(pan_step=np.radians(15.0)))
-    limits = BaselineLimits(THETA, 0.0, clicks)
-    found = limit_poses(pair, body.surface, body.measure(pair), limits)
-    assert len(found) >= 2
-    for camera in found:
-        axis = camera.world_from_device[:3, 2]
-        pan = np.degrees(np.arctan2(axis[1], axis[0]))
-        assert pan / 15.0 == pytest.approx(round(pan / 15.0), abs=1e-9)

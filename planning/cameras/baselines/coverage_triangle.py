@@ -191,32 +191,3 @@ def _dot(a: _Array, b: _Array) -> _Array:
 
 def _wrapped(angle: _Array) -> _Array:
     return np.pi - np.mod(np.pi - angle, 2.0 * np.pi)
-
-
-def covered_azimuth(
-    radius: float,
-    ring_radius: float,
-    max_incidence: float,
-    half_field: float | None = None,
-) -> float:
-    """Return eta, to which a camera that faces the centre of a disc covers it [rad].
-
-    It covers the section of a cylinder likewise, to either side of itself.
-
-    ::
-
-        eta = min(theta - asin(rho/S sin theta), asin(S/rho sin alpha) - alpha)
-
-    The second only if sin(alpha) < rho/S: else the whole body is in the field.
-
-    Args:
-        radius: rho in [m], less than S.
-        ring_radius: S, of the camera centres about the body's centre, in [m].
-        max_incidence: theta in [rad].
-        half_field: alpha in [rad]; None: no limit.
-    """
-    ratio = radius / ring_radius
-    eta = max_incidence - np.arcsin(ratio * np.sin(max_incidence))
-    if half_field is not None and np.sin(half_field) < ratio:
-        eta = min(eta, np.arcsin(np.sin(half_field) / ratio) - half_field)
-    return float(eta)
