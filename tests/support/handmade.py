@@ -607,6 +607,16 @@ def _claim_devices(document: Any, rows: Any, area: Any, inside: np.ndarray) -> N
         )
 
 
+def _cone_angle(surface: Surface, members: np.ndarray) -> float:
+    """Least angle about the mean normal within which 98 % of the area faces."""
+    areas, normals = (
+        values[members]
+        for values in (surface.mesh.face_areas, surface.mesh.face_normals)
+    )
+    off = np.arccos(normals @ (areas @ normals) / np.linalg.norm(areas @ normals))
+    return min(a for a in off if areas[off <= a].sum() >= 0.98 * areas.sum())
+
+
 def _claim_regions(
     document: Any, surface: Surface, rows: Any, faces: np.ndarray
 ) -> None:
@@ -630,7 +640,7 @@ def _claim_regions(
                 "area_m2": float(areas[members].sum()),
                 "n_faces": int(members.sum()),
                 "mean_normal": (mean / np.linalg.norm(mean)).tolist(),
-                "cone_angle": 1.0,
+                "cone_angle": _cone_angle(surface, members),
                 "mean_curvedness": 20.0,
                 "lit_by": sorted(names),
                 "lit_fraction": sum(weight for row, weight in mine if row["lit"])

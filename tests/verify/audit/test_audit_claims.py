@@ -317,6 +317,14 @@ FALSE = {
         _at("marginal", 0, "lit_surface_m2", 1.0),
         "marginal.projectors.1.lit_surface_m2: 1.0 is claimed, must be an area",
     ),
+    "marginal without the plan's own": (
+        lambda document: document["marginal"].pop(1),
+        "marginal.projectors: rows of [1] devices: each number once, among them",
+    ),
+    "marginal of one number twice": (
+        lambda document: document["marginal"].append(document["marginal"][2]),
+        "marginal.cameras: rows of [1, 1, 2] devices",
+    ),
     "phi": (_at("baselines", 0, "phi", lambda x: x + 0.01), "C1-C2.phi: claimed"),
     "slack": (_at("baselines", 0, "slack", lambda x: -x), "C1-C2.slack: claimed"),
     "covered": (_at("baselines", 1, "covered", False), "C2-C1.covered: False is"),
@@ -333,6 +341,10 @@ FALSE = {
     "mean normal": (
         _entry("regions", 0, "mean_normal", lambda x: [1, 0, 0]),
         "mean_normal",
+    ),
+    "cone of a region": (
+        _entry("regions", 0, "cone_angle", lambda x: 0.9 * x),
+        "cone_angle",
     ),
     "D1": (_at("baselines", 0, "D1", lambda x: x * 1.001), "C1-C2.D1: claimed"),
     "E": (_at("baselines", 0, "E", 2, lambda x: x + 2e-4), "mm off the surface"),
@@ -456,6 +468,7 @@ FALSE = {
     "cameras before": (_at("cost", "n_cameras_before", 4), "greedy_count is 3"),
     "greedy": (_at("certificates", "cameras", "greedy_count", 2), "n_cameras_before"),
     "C without a term": (_at("cost", "t3", None), "the sum of its terms is None"),
+    "t4": (_at("cost", "t4", -1.0), "cost.t4: -1.0 s is no time"),
     "frames": (_at("cost", "n_frames", 30), "cost.n_frames: claimed 30, recomputed 3"),
     "frame time": (_at("cost", "frame_s", 0.025), "rig.*.figures is 0.0333"),
     "t1": (_at("cost", "t1", lambda t1: 0.9 * t1), "cost.t1: claimed"),

@@ -36,6 +36,9 @@ def audit_cost(case: AuditCase, findings: AuditFindings) -> None:
         acquired = None if frame_s is None else shown * frame_s
         total = _total(cost, acquired, pixels * number / max(count, 1))
         truths.append((name, total, "the sum of its terms"))
+    for name in ("t2", "t3", "t4", "t5", "render_s"):
+        term = getattr(cost, name)
+        findings.holds(term is None or term >= 0.0, name, f"{term!r} s is no time")
     for name, truth, whose in truths:
         slack = _RELATIVE * abs(truth or 0.0)
         findings.same(name, getattr(cost, name), truth, whose, slack)

@@ -34,7 +34,15 @@ def audit_tables(case: AuditCase, findings: AuditFindings) -> None:
         verb, chosen = _verb(kind.name), np.any(kind.covers, axis=0)
         for part, (_, whole) in case.estimator.wholes().items():
             table = marginal_of(case.plan, kind.name, part)
-            findings.holds(table, f"marginal.{kind.name}s", "is missing")
+            counts = [number for number, _ in table]
+            findings.holds(
+                min(counts, default=0) > 0
+                and counts.count(len(kind.devices)) == 1
+                and len(set(counts)) == len(counts),
+                f"marginal.{kind.name}s",
+                f"rows of {counts} devices: each number once, among them the plan's "
+                f"{len(kind.devices)}",
+            )
             for number, area in table:
                 key = f"marginal.{kind.name}s.{number}.{verb}_{part}_m2"
                 if number == len(kind.devices):

@@ -18,6 +18,8 @@ from planning.verify.audit.predicates.recompute import light_of_plan
 MARGIN_SLACK = np.radians(2.0)
 # Room for the rounding of a written direction or angle [rad].
 _ANGLE = 1e-4
+# Share of a region's area whose normals its cone holds.
+_HELD = 0.98
 _SELECTIONS = ("curvature", "faces", "vertex_weight")
 
 
@@ -143,6 +145,18 @@ def _audit_size(case: AuditCase, region: RegionRecord, findings: AuditFindings) 
         whose = "the area-weighted mean of its faces' normals"
         claimed = region.mean_normal
         findings.same("mean_normal", claimed, mean / length, whose, _ANGLE)
+        _audit_cone(region, mesh.face_normals[faces], mesh.face_areas[faces], findings)
+
+
+def _audit_cone(
+    region: RegionRecord, normals: Array, areas: Array, findings: AuditFindings
+) -> None:
+    """The angle about the mean normal that holds 98 % of a region's area."""
+    off = np.arccos(np.clip(normals @ np.array(region.mean_normal), -1.0, 1.0))
+    order = np.argsort(off)
+    inside = np.cumsum(areas[order]) >= _HELD * (1.0 - ROUNDING) * areas.sum()
+    truth = float(off[order][np.argmax(inside)])
+    findings.number("cone_angle", region.cone_angle, truth, 2.0 * _ANGLE, "rad")
 
 
 def _audit_fraction(
