@@ -27,8 +27,9 @@ _ROUNDS = 3
 _FINER = 4
 # Counted work of the cover about which more candidates are offered.
 _SEEDS_BUDGET = 2e8
-# Counted work of the cover whose count is kept, where less left it unproved.
-_PROOF_BUDGET = 1e10
+# Counted work of the cover whose count is kept, where less left it unproved; the
+# latter with floors, of which more was seen to prove no more.
+_PROOF_BUDGET, _FLOORED_PROOF_BUDGET = 1e10, 3e9
 
 # Limits that are told of only where something could violate them.
 _BY_BLOCKERS = {
@@ -170,8 +171,11 @@ def _fewest(
         selection = again
     if selection.lower_bound < selection.needed:
         # Only a count that is kept is worth a longer proof.
+        floored = selection.floors is not None
         selection = select_fewest(
-            candidates.cover, known=selection.smallest, budget=_PROOF_BUDGET
+            candidates.cover,
+            known=selection.smallest,
+            budget=_FLOORED_PROOF_BUDGET if floored else _PROOF_BUDGET,
         )
     return candidates, selection
 
