@@ -21,6 +21,8 @@ from .route_problem import CameraSet, RouteProblem
 # and programs for each of these.
 _DROPPED, _PURSUED = 8, 3
 _PROGRAMS = 12
+# Sets that lack more than this share of what is required aren't promising.
+_CLOSABLE = 0.08
 # How far these move centres and aims, as a share of the largest radius of the shell.
 _REACH, _SHRINK = 0.5, 0.4
 _STEPS = (1.0, 0.5)
@@ -32,17 +34,18 @@ _WORTH = 0.2
 
 def one_fewer(problem: RouteProblem, placed: CameraSet) -> CameraSet | None:
     """Return the best of one camera fewer, the hole closed; None where none may go."""
+    begun = [placed.without(i) for i in placed.least_missed(problem.n_fixed)]
     tried: list[CameraSet] = []
     for programs, most in ((1, _DROPPED), (_PROGRAMS, _PURSUED)):
-        begun = tried or [
-            placed.without(i) for i in placed.least_missed(problem.n_fixed)
-        ]
-        tried = []
-        for one in begun[:most]:
-            tried.append(closed(problem, one, programs))
-            if not problem.short(tried[-1]):
-                return tried[-1]
-        tried.sort(key=lambda one: (problem.short(one), -one.count))
+        for i, one in enumerate(begun[:most]):
+            begun[i] = closed(problem, one, programs)
+            if not problem.short(begun[i]):
+                return begun[i]
+        tried = sorted(
+            begun[:most] or tried, key=lambda one: (problem.short(one), -one.count)
+        )
+        least = _CLOSABLE * problem.quotas.total
+        begun = [one for one in tried if problem.short(one) <= least]
     return tried[0] if tried else None
 
 
