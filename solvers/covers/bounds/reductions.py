@@ -152,8 +152,8 @@ class ReducedCover:
 
     def covered_by(self, selected: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the weight that sets cover of each row set, shape (n_g,)."""
-        covered = self.served(selected) >= self.needs
-        return self.by_row_set(np.where(covered, self.weights, 0.0))
+        served = self.served(selected) >= self.needs
+        return self.by_row_set(served * self.weights)
 
     def shortage(self, selected: NDArray[np.int64]) -> float:
         """Return the weight that is lacking of row sets, and of all of them."""
@@ -162,8 +162,7 @@ class ReducedCover:
         return float(lacking) + max(0.0, self.quota - float(covered.sum()))
 
     def _enough(self, covered: NDArray[np.float64]) -> bool:
-        each = bool(np.all(covered >= self.quotas))
-        return each and float(covered.sum()) >= self.quota
+        return bool(np.all(covered >= self.quotas) and covered.sum() >= self.quota)
 
 
 def reduce_problem(
@@ -175,12 +174,9 @@ def reduce_problem(
     """
     costs = problem.costs if costs is None else costs
     exponent, whole, inexact = _whole_weights(problem)
-    wanted, row_sets = problem.required_weight, problem.row_sets
-    quotas = _quotas(problem, wanted, exponent, inexact)
-    quota = 0.0
-    if problem.required_total is not None:
-        total = np.array([problem.required_total])
-        quota = float(_quotas(problem, total, exponent, inexact.sum())[0])
+    row_sets, total = problem.row_sets, np.array([problem.required_total or 0.0])
+    quotas = _quotas(problem, problem.required_weight, exponent, inexact)
+    quota = float(_quotas(problem, total, exponent, inexact.sum())[0])
 
     already = np.asarray(problem.covers[:, problem.fixed].sum(axis=1)).ravel()
     needs = problem.needs - already
