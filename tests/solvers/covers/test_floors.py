@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import linprog
 
 from solvers import CoverProblem, SolveStatus, solve_cover
+from solvers.covers import floored_counts
 from solvers.covers.bounds.mixed_integer import branch_and_bound
 from solvers.covers.bounds.reductions import reduce_problem
 from solvers.covers.bounds.relaxation import cost_bound, count_bound, least_service
@@ -133,6 +134,19 @@ def test_a_floor_costs_a_set_that_the_total_does_not():
     # What stands already is enough for the total, which then takes none.
     standing = solve_cover(replace(asked, fixed=[0, 1]))
     assert (standing.lower_bound, standing.total_bound) == (3, 2)
+
+
+@pytest.mark.parametrize("seed", [1, 10, 11])
+def test_from_below_alone_the_count_is_found(seed, monkeypatch):
+    def all_sets(cover, *_):
+        return np.arange(cover.n_sets), [Prices.even(cover)]
+
+    monkeypatch.setattr(floored_counts, "_from_above", all_sets)
+    problem = floored(seed)
+    needed, _ = fewest_and_most(problem)
+    solution = solve_cover(problem, seed=1)
+    assert solution.cost == solution.lower_bound == needed > solution.total_bound
+    assert meets(problem, solution.selected)
 
 
 def test_a_floor_that_costs_weight_but_no_set_is_met():
