@@ -338,8 +338,10 @@ def _old(projectors: Path, name: str) -> int:
         case.measured[:, chosen],
         baseline_limits(case.scene),
     )
-    theirs = measured_by(case.scene, limit, case.samples)
-    both = np.concatenate([case.measured, theirs], axis=1) if limit else case.measured
+    both = case.measured
+    if limit:
+        theirs = measured_by(case.scene, limit, case.samples)
+        both = np.concatenate([case.measured, theirs], axis=1)
     told["limit"] = fewest_count(replace(cover, covers=both))
     print(json.dumps(told))
     return 0

@@ -104,6 +104,7 @@ class Body:
             self.measure,
             widen,
             Quotas(required, RegionFloors.none(len(self.points)), np.zeros(1, int)),
+            np.arange,
             len(fixed),
         )
 

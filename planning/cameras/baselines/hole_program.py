@@ -33,9 +33,9 @@ _KEPT, _HOLE = 24, 24
 # Margins above this, of a cosine, aren't used up within a step.
 _AT_STAKE = 0.4
 # Limits that are so far past weigh half as much as those just past.
-_HALF_WEIGHT = 0.1
+_HALF_WEIGHT = 0.3
 # What a sample weighs that a program before lost.
-_DEMANDED = 10.0
+_DEMANDED = 3.0
 # As how far past a sample counts that only a shadow keeps from a camera.
 _HIDDEN = 0.3
 
@@ -71,9 +71,9 @@ class HoleTerms:
         past = self.past(margins)
         owner, nearest = past.argmax(axis=1), past.max(axis=1)
         kept, weights = [np.zeros((0, 2), np.int64)], [np.zeros(0)]
-        for c, samples in self._kept(margins, lost):
+        for c, samples, each in self._kept(margins, lost):
             kept.append(np.column_stack([np.full(len(samples), c), samples]))
-            weights.append(np.where(np.isin(samples, lost), _DEMANDED, 1.0))
+            weights.append(np.where(np.isin(samples, lost), _DEMANDED, 1.0) * each)
         for c in range(len(self.cameras)):
             mine = np.flatnonzero(self.hole & (owner == c))
             some = mine[spread_points(self.surface.points[mine], _HOLE)]
@@ -100,8 +100,11 @@ class HoleTerms:
 
     def _kept(
         self, margins: _Array, lost: NDArray[np.int64]
-    ) -> Iterator[tuple[int, NDArray[np.int64]]]:
-        """Some of what each camera measures best, unless there is much to spare."""
+    ) -> Iterator[tuple[int, NDArray[np.int64], float]]:
+        """Some of what each camera measures best, and how many each stands for.
+
+        Where there is much to spare nothing is at stake.
+        """
         held = np.where(self.measured, margins, -np.inf)
         best, camera = held.max(axis=1), held.argmax(axis=1)
         for c in range(len(self.cameras)):
@@ -109,7 +112,8 @@ class HoleTerms:
             mine = np.flatnonzero(at_stake)
             first = np.flatnonzero(np.isin(mine, lost))[:_KEPT]
             n = _KEPT + len(first)
-            yield c, mine[spread_points(self.surface.points[mine], n, first)]
+            some = mine[spread_points(self.surface.points[mine], n, first)]
+            yield c, some, len(mine) / max(len(some), 1)
 
     def ends(self, past: _Array) -> Iterator[Seam]:
         """Where a part ends beside what another camera is to take over.

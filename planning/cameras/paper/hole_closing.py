@@ -22,19 +22,23 @@ from .route_problem import CameraSet, RouteProblem
 _DROPPED, _PURSUED = 8, 3
 _PROGRAMS = 12
 # Sets that lack more than this share of what is required aren't promising.
-_CLOSABLE = 0.08
+_CLOSABLE = 0.25
 # How far these move centres and aims, as a share of the largest radius of the shell.
 _REACH, _SHRINK = 0.5, 0.4
 _STEPS = (1.0, 0.5)
 # Programs in a row that measure no more, until it is given up.
 _FAILED = 3
 # A program that measures less than this share of what is missing won't do in the rest.
-_WORTH = 0.2
+_WORTH = 0.1
 
 
 def one_fewer(problem: RouteProblem, placed: CameraSet) -> CameraSet | None:
     """Return the best of one camera fewer, the hole closed; None where none may go."""
-    begun = [placed.without(i) for i in placed.least_missed(problem.n_fixed)]
+    free = placed.least_missed(problem.n_fixed)
+    begun = [placed.without(i) for i in free[: _DROPPED - 1]]
+    if begun and begun[0].cameras:
+        best = problem.best(len(begun[0].cameras)).tolist()
+        begun.insert(0, problem.placed([problem.offered[i] for i in best]))
     tried: list[CameraSet] = []
     for programs, most in ((1, _DROPPED), (_PROGRAMS, _PURSUED)):
         for i, one in enumerate(begun[:most]):

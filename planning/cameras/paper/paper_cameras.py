@@ -40,6 +40,8 @@ from .route_problem import Cameras, RouteProblem
 # costs.
 _PROGRAMS = 4
 _EVALUATIONS = 16
+# Counted work for the candidates that measure most.
+_BEST = 1e8
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,6 +201,7 @@ def route_problem(
         together,
         widen,
         cover.quotas,
+        lambda count: cover.most_covering(count, None, _BEST)[0],
         n,
         on.rings,
     )

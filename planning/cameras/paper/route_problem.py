@@ -29,6 +29,8 @@ class RouteProblem:
             (n, k); nothing where they don't fit.
         widen: Maximises the baselines of cameras to the limit (10), losing nothing.
         quotas: What must be measured, of all samples and of regions.
+        best: As many of the offered cameras that measure most, as far as counted work
+            goes; their indices.
         n_fixed: Existing cameras.
         rings: Rings of each projector on the samples; None: no rings.
     """
@@ -40,6 +42,7 @@ class RouteProblem:
     together: Callable[[Sequence[PlannedCamera]], _Measured]
     widen: Callable[[Sequence[PlannedCamera]], WidestBaselines]
     quotas: Quotas
+    best: Callable[[int], NDArray[np.int64]]
     n_fixed: int = 0
     rings: RingsOnSurface | None = None
 
