@@ -211,8 +211,8 @@ class RequirementsTable(Table):
     coverage: Share = 0.95
     dominant_coverage: Share = 0.90
     min_reachable: Share = 0.90
-    region_coverage: ShareOrNone = 0.0
-    region_share: Share = 0.01
+    region_coverage: ShareOrNone = 0.5
+    region_share: Share = 0.03
 
 
 class CheckTable(Table):

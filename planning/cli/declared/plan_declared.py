@@ -122,7 +122,7 @@ from planning.cli.console import (
     type=Share(or_none=True),
     metavar="F",
     help="Floor of every dominant region: lit and measured share of what is reachable "
-    "of it; 0: none [default: 0].",
+    "of it; 0: none [default: 0.50].",
 )
 @click.option(
     "--accuracy",
