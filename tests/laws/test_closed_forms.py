@@ -53,7 +53,13 @@ def planned(
 ):
     """Plan the projectors of a surface; shadows count where the effort says so."""
     rig = load_rig("default", light)
-    wishes = Wishes(max_projectors=20, target="surface", dominant_coverage=share)
+    wishes = Wishes(
+        max_projectors=20,
+        target="surface",
+        dominant_coverage=share,
+        # Closed forms are of the total, wherever it lies.
+        region_coverage=0.0,
+    )
     order = PlanRequest(mesh, rig, wishes)
     ready = prepared(order, Stopwatch())
     required = ready.scene.requirements

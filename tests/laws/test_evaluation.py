@@ -104,6 +104,7 @@ def plate():
 def planned(folder, plate, with_few_samples):
     """A plate whose ends most of the workspace doesn't reach, from both sides."""
     wishes = "[requirements]\ncoverage = 0.8\ndominant_coverage = 0.8\n"
+    wishes += "region_coverage = 0\n"
     rig = rig_file(folder, "plan.toml", wishes + "min_reachable = 0.1\n")
     with with_few_samples():
         plan = made(plate, rig, max_projectors=3)

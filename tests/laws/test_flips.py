@@ -59,6 +59,7 @@ min_conditioning = 0.3
 coverage = 0.8
 dominant_coverage = 0.8
 min_reachable = 0.1
+region_coverage = 0
 """
 
 

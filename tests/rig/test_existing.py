@@ -222,7 +222,8 @@ def planned(tmp_path_factory, with_few_samples):
         .replace("[100, -1200, 300]", "[-300, -880, 250]")
         + BODIES
         + "[requirements]\ncoverage = 0.8\ndominant_coverage = 0.8\n"
-        "min_reachable = 0.1\n[placement]\nn_candidate_projectors = 600\n"
+        "min_reachable = 0.1\nregion_coverage = 0\n"
+        "[placement]\nn_candidate_projectors = 600\n"
         "n_candidate_cameras = 400\nn_reference_projectors = 600\n"
         "n_reference_cameras = 400\n"
     )
@@ -303,7 +304,7 @@ def test_they_stay_are_marked_and_the_audit_agrees(planned):
         ),
         (
             lambda d: d["coverage"]["blocked_by_body_m2"].update(C1=0.004),
-            "coverage.blocked_by_body_m2.C1: claimed 0.004 m², recomputed 0 m²",
+            "coverage.blocked_by_body_m2.C1: claimed 0.004 m², recomputed 0",
         ),
         (
             lambda d: d["coverage"].pop("blocked_by_body_m2"),

@@ -221,6 +221,7 @@ def test_the_audit_imports_nothing_of_the_planner():
         "planning.model.document.certificates",
         "planning.model.document.check_records",
         "planning.model.document.part",
+        "planning.model.document.plan_document",
         "planning.model.document.coverage_records",
         "planning.model.document.input_records",
         "planning.model.obstacles",

@@ -10,12 +10,26 @@ import numpy as np
 
 from geometry.arrays import Array, Mask
 from geometry.devices import ParallelModel, PinholeModel
-from geometry.mesh.extent import enclosing_ball
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
 
 from .audit_optics import in_frame, in_image, in_world, pixels_of, towards
 from .occlusion import Block, bodies_about, bodies_but
+
+# Steps after which the ball is a few thousandths too large at most.
+_BALL_STEPS = 400
+
+
+def _ball(points: Array) -> tuple[Array, float]:
+    """Return the smallest ball about points (n, 3), by steps to the farthest of them.
+
+    Badoiu and Clarkson, "Smaller core-sets for balls", 2003.
+    """
+    centre = points.mean(axis=0)
+    for step in range(2, _BALL_STEPS):
+        far = points[np.argmax(np.sum((points - centre) ** 2, axis=1))]
+        centre = centre + (far - centre) / step
+    return centre, float(np.sqrt(np.sum((points - centre) ** 2, axis=1).max()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +95,7 @@ class DivergingRays:
     def narrowest_ring(self, points: Array) -> float:
         """Return the tangent of the narrowest cone, about any axis, that holds them."""
         rays, _ = self.to_points(points)
-        axis, _ = enclosing_ball(rays)
+        axis, _ = _ball(rays)
         return float(np.tan(np.arccos((rays @ axis).min() / np.linalg.norm(axis))))
 
     def coordinate_of(self, length_m: float, standoff_m: float) -> float:
@@ -142,7 +156,7 @@ class ParallelRays:
     def narrowest_ring(self, points: Array) -> float:
         """Return the radius of the narrowest cylinder along the light, [m]."""
         flat = in_frame(self.pose, points) * [1.0, 1.0, 0.0]
-        return enclosing_ball(flat)[1]
+        return _ball(flat)[1]
 
     def coordinate_of(self, length_m: float, standoff_m: float) -> float:
         """Return what a length across the light is of c."""
