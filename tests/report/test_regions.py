@@ -184,6 +184,16 @@ def test_a_missed_floor_names_the_region_by_size_and_place(plan):
     assert "worst: region 0 (" in worst
 
 
+def test_a_region_too_small_for_a_floor_that_would_miss_it_is_named(plan, handmade):
+    small = handmade.tampered(
+        plan,
+        lambda document: document["requirements"].update(region_share=1.0),
+    )
+    (line,) = region_lines(small)
+    assert "1 of 2 regions under 100.0 % of the target" in line
+    assert "would miss it; the largest: region 0 (65.1 cm²" in line
+
+
 def test_places_follow_up_and_the_axes_of_the_mesh(plan, handmade):
     up = handmade.tampered(
         plan,

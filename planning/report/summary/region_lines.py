@@ -31,7 +31,7 @@ def region_lines(plan: RigPlan) -> list[str]:
     """Return how many regions meet the floor, and the worst; none of older plans."""
     shares = {region.id: min(_shares(areas)) for region, areas in _large(plan)}
     if not shares:
-        return []
+        return labelled("REGIONS", list(_small_lines(plan)))
     asked, n = plan.requirements.region_coverage, len(shares)
     met = n - sum(areas.floor == "missed" for _, areas in _large(plan))
     floor = (
@@ -44,7 +44,29 @@ def region_lines(plan: RigPlan) -> list[str]:
     least = min(shares, key=lambda number: shares[number])
     region, areas = next(pair for pair in _large(plan) if pair[0].id == least)
     worst = f"worst: {region_words(plan, region)}, {_deed(areas)}"
-    return labelled("REGIONS", [floor, worst])
+    return labelled("REGIONS", [floor, worst, *_small_lines(plan)])
+
+
+def _small_lines(plan: RigPlan) -> Iterator[str]:
+    """Yield what is said of regions too small for a floor, where some are below it."""
+    required, large = plan.requirements, {region.id for region in plan.large_regions}
+    small = [region for region in plan.document.regions if region.id not in large]
+    below = [
+        (region, areas)
+        for region in small
+        if (areas := region.coverage) is not None
+        and areas.samples
+        and min(_shares(areas)) < required.region_coverage
+    ]
+    if not below:
+        return
+    region, areas = max(below, key=lambda pair: pair[0].area_m2)
+    yield (
+        f"{len(below)} of {count_words(len(small), 'region')} under "
+        f"{percent(required.region_share)} of the target, for which there is no "
+        f"floor, would miss it; the largest: {region_words(plan, region)}, "
+        f"{_deed(areas)}"
+    )
 
 
 def region_table(plan: RigPlan) -> list[str]:
