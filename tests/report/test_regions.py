@@ -190,7 +190,7 @@ def test_a_region_too_small_for_a_floor_that_would_miss_it_is_named(plan, handma
         lambda document: document["requirements"].update(region_share=1.0),
     )
     (line,) = region_lines(small)
-    assert "1 of 2 regions under 100.0 % of the target" in line
+    assert "2 of 2 regions under 100.0 % of the target" in line
     assert "would miss it; the largest: region 0 (65.1 cm²" in line
 
 
