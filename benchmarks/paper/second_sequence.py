@@ -6,7 +6,7 @@ Runs the paper's box and face (a lens that sees all rings) under parallel and di
 light, then plans of the sample and of a scanned face with at most three projectors,
 free ring axes (or the plans named, `plan.json`). Each is measured by a first sequence,
 then again with as many rings: midway between the first ones, or where
-`planning.verify.reconstruction.patterns.second_sequence` places them from the first
+`planning.verify.reconstruction.density.second_sequence` places them from the first
 points. Prints how far the surface is from straight lines between neighbouring rings of
 both sequences, along the beam, at eight places of each gap and 720 azimuths, where a
 projector lights it and no step is crossed: rms, 99 % and largest. And the share of what
@@ -33,7 +33,7 @@ from planning.verify.audit.coverage.prediction import predict_measured
 from planning.verify.reconstruction.calibration import ProjectorCalibration
 from planning.verify.reconstruction.check.accuracy import nearest_distance
 from planning.verify.reconstruction.cloud import Cloud
-from planning.verify.reconstruction.patterns.second_sequence import (
+from planning.verify.reconstruction.density.second_sequence import (
     both_sequences,
     second_sequence,
 )

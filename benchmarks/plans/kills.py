@@ -32,7 +32,7 @@ import trimesh
 from PIL import Image
 
 from planning import RigPlan
-from planning.verify.reconstruction.cloud_file import is_cloud
+from planning.verify.reconstruction.check.cloud_file import is_cloud
 
 RUN = [sys.executable, "-c", "from planning.cli.main import main; main()"]
 RIG = """

@@ -27,7 +27,7 @@ from planning.experiments.setups import Experiment, paper_experiment
 from planning.experiments.table import outcome_document, outcome_lines
 from planning.model.files import write_atomically
 from planning.report.drawing.picture_view import save_picture
-from planning.verify.reconstruction.cloud_file import LengthUnit
+from planning.verify.reconstruction.check.cloud_file import LengthUnit
 from planning.verify.reconstruction.render.countdown import countdown
 
 from .console import print_json, reporter, writable

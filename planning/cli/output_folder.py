@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from uuid import uuid4
 
-from planning.verify.reconstruction.cloud_file import is_cloud
+from planning.verify.reconstruction.check.cloud_file import is_cloud
 from planning.verify.reconstruction.pattern_files import is_patterns
 
 from .console import stop_signals

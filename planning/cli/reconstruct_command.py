@@ -25,16 +25,16 @@ from planning.verify.reconstruction.captures.captured import (
 )
 from planning.verify.reconstruction.captures.captures import CaptureFolder
 from planning.verify.reconstruction.check.accuracy import Expected
+from planning.verify.reconstruction.check.cloud_file import (
+    CloudFile,
+    LengthUnit,
+    remove_cloud,
+)
 from planning.verify.reconstruction.check.deviation import (
     Deviation,
     measure_deviation,
 )
 from planning.verify.reconstruction.check.result import PairCount, Reconstruction
-from planning.verify.reconstruction.cloud_file import (
-    CloudFile,
-    LengthUnit,
-    remove_cloud,
-)
 from planning.verify.reconstruction.pattern_files import check_patterns
 from planning.verify.reconstruction.reconstruct import (
     BothSequences,

@@ -19,7 +19,7 @@ from planning.report.drawing.picture_view import (
 )
 from planning.report.drawing.shader import Shader
 from planning.verify.reconstruction.arrays import Array, Mask
-from planning.verify.reconstruction.cloud_file import ramp
+from planning.verify.reconstruction.check.cloud_file import ramp
 
 from .paper_devices import UP, bearing
 

@@ -7,7 +7,7 @@ import numpy as np
 from geometry.mesh.sampling import SurfaceSamples, sample_surface
 from planning.verify.reconstruction.check.result import Reconstruction
 from planning.verify.reconstruction.cloud import Cloud
-from planning.verify.reconstruction.patterns.second_sequence import (
+from planning.verify.reconstruction.density.second_sequence import (
     both_sequences,
     numbered,
     second_sequence,

@@ -286,7 +286,7 @@ def test_a_calibration_moves_devices_in_simulation_and_captures(
 
 
 def test_a_cloud_of_someone_else_is_not_removed(folder, simulated, tmp_path):
-    from planning.verify.reconstruction.cloud_file import remove_cloud
+    from planning.verify.reconstruction.check.cloud_file import remove_cloud
 
     other = tmp_path / "cloud.ply"
     other.write_text("ply\nformat ascii 1.0\ncomment mine\n")

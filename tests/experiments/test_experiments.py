@@ -53,7 +53,7 @@ from planning.verify.reconstruction.calibration import PairCalibration
 from planning.verify.reconstruction.check.accuracy import measure_accuracy
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.decode.triangulate import intersect_rings
-from planning.verify.reconstruction.patterns.second_sequence import second_sequence
+from planning.verify.reconstruction.density.second_sequence import second_sequence
 from planning.verify.reconstruction.reconstruct import reconstruct
 from planning.verify.reconstruction.render.render import render_lines
 from planning.verify.reconstruction.render.rendered_light import Shown

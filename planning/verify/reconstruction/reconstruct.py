@@ -15,15 +15,15 @@ from planning.verify.reconstruction.check.merge import Merged, merge
 from planning.verify.reconstruction.check.overlaps import pixel_sizes
 from planning.verify.reconstruction.check.result import PairCount, Reconstruction
 from planning.verify.reconstruction.decode.decode import Pairs
+from planning.verify.reconstruction.density.second_sequence import (
+    both_sequences,
+    numbered,
+    second_sequence,
+)
 from planning.verify.reconstruction.faults.causes import explained
 from planning.verify.reconstruction.faults.measured_clouds import (
     MeasuredClouds,
     rejection,
-)
-from planning.verify.reconstruction.patterns.second_sequence import (
-    both_sequences,
-    numbered,
-    second_sequence,
 )
 from planning.verify.reconstruction.render.photometry import Photometry, assumed_light
 from planning.verify.reconstruction.render.rendered import (

@@ -12,13 +12,13 @@ from geometry.poses import transform
 from geometry.rays.proximity import closest_points
 from geometry.shapes.primitives import sphere
 from planning.cli.deviation_table import deviation_lines
+from planning.verify.reconstruction.check.cloud_file import CloudFile, LengthUnit
 from planning.verify.reconstruction.check.deviation import (
     best_fit,
     measure_deviation,
 )
 from planning.verify.reconstruction.check.merge import Merged
 from planning.verify.reconstruction.cloud import Cloud
-from planning.verify.reconstruction.cloud_file import CloudFile, LengthUnit
 from planning.verify.reconstruction.scanner import Scanner
 
 NOISE_M = 1e-4

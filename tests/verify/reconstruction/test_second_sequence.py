@@ -5,14 +5,14 @@ from itertools import product
 import numpy as np
 import pytest
 
-from planning.verify.reconstruction.light_laws import LIGHTS
-from planning.verify.reconstruction.patterns.ring_patterns import DrawnRings
-from planning.verify.reconstruction.patterns.second_radii import (
+from planning.verify.reconstruction.density.second_radii import (
     Gaps,
     MeasuredRings,
     nearest_rings,
     second_radii,
 )
+from planning.verify.reconstruction.light_laws import LIGHTS
+from planning.verify.reconstruction.patterns.ring_patterns import DrawnRings
 
 STEEPEST = np.deg2rad(60.0)
 RADII = np.array([0.01, 0.02, 0.03, 0.04])

@@ -14,8 +14,7 @@ from scipy.ndimage import median
 from scipy.spatial import KDTree
 
 from planning.verify.reconstruction.arrays import Array, Indices
-
-from .ring_patterns import DrawnRings
+from planning.verify.reconstruction.patterns.ring_patterns import DrawnRings
 
 Numbers = NDArray[np.integer]
 _AZIMUTHS = 180

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from planning.model.document.input_records import MeshRecord
 from planning.model.files import write_atomically
-from planning.verify.reconstruction.check.deviation import Deviation
-from planning.verify.reconstruction.check.merge import Merged
+from planning.verify.reconstruction.arrays import Array
 
-from .arrays import Array
+from .deviation import Deviation
+from .merge import Merged
 
 _GENERATOR = "comment ringrig cloud"
 _PLY_TYPES = {"<f8": "double", "<f4": "float", "|u1": "uchar"}

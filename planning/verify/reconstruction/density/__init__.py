@@ -1,0 +1,1 @@
+"""A second sequence of rings, from where the first one found the surface bent."""
