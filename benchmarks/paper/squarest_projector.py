@@ -5,18 +5,12 @@ stayed, then among cameras the one with the smaller standard deviation along the
 Kept for the comparison in `benchmarks.paper.redundancy`.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from planning.verify.reconstruction.arrays import Array, Indices, Mask
+from planning.verify.reconstruction.check.tiles import Tiles, plane_normals
 from planning.verify.reconstruction.cloud import Cloud
 
-# Edges are compared within tiles of the image about one ring pitch wide.
-_MIN_TILE_PX, _MAX_TILE_PX = 6, 64
-_MIN_POINTS = 12
-# A plane is one if the points spread in two directions, at most this unevenly.
-_MIN_SPREAD = 0.02
 # A projector may stand for another in a tile if it measured this share as many points.
 _MIN_SUPPORT = 0.4
 # Directions that a surface may face, and one for surface whose direction isn't known.
@@ -25,14 +19,13 @@ _SIDES = 7
 
 def squarest_projectors(cloud: Cloud, *, gap_m: float, pitch_px: float) -> Cloud:
     """Return the points that stay, of rings so far apart on the object, in images."""
-    side = int(np.clip(np.ceil(pitch_px), _MIN_TILE_PX, _MAX_TILE_PX))
     normals = np.full((len(cloud), 3), np.nan)
     square = np.zeros(len(cloud), dtype=bool)
     for camera in np.unique(cloud.camera):
         seen = np.flatnonzero(cloud.camera == camera)
         by_camera = cloud.take(seen)
-        tiles = _Tiles.of(by_camera.pixels, side)
-        normals[seen] = _plane_normals(by_camera, tiles)
+        tiles = Tiles.of(by_camera.pixels, pitch_px)
+        normals[seen] = plane_normals(by_camera.points, by_camera.rays, tiles)
         square[seen] = _squarest_projector(by_camera, tiles, normals[seen])
     squarest, normals = cloud.take(square), normals[square]
     sigma = squarest.sigma(normals)
@@ -40,55 +33,7 @@ def squarest_projectors(cloud: Cloud, *, gap_m: float, pitch_px: float) -> Cloud
     return squarest.take(best)
 
 
-@dataclass(frozen=True, eq=False)
-class _Tiles:
-    """Squares of an image, and which of them each point is in."""
-
-    of_point: Indices
-    shape: tuple[int, int]
-
-    @classmethod
-    def of(cls, pixels: Array, side: int) -> "_Tiles":
-        """Lay tiles over the points, with one row and column of empty ones around."""
-        place = np.floor((pixels - pixels.min(axis=0)) / side).astype(np.int64) + 1
-        columns, rows = (place.max(axis=0) + 2).tolist()
-        return cls(place[:, 1] * columns + place[:, 0], (rows, columns))
-
-    def occupied(self, chosen: Mask) -> Mask:
-        """Return whether each tile holds one of the chosen points, (n_tiles,)."""
-        rows, columns = self.shape
-        return np.bincount(self.of_point[chosen], minlength=rows * columns) > 0
-
-    def sum_around(self, values: Array | None = None) -> Array:
-        """Return sums over each tile and its eight neighbours, (n_tiles,)."""
-        rows, columns = self.shape
-        summed = np.bincount(self.of_point, values, rows * columns)
-        grid = summed.astype(np.float64).reshape(self.shape)
-        padded = np.pad(grid, 1)
-        wide = padded[:-2] + padded[1:-1] + padded[2:]
-        return (wide[:, :-2] + wide[:, 1:-1] + wide[:, 2:]).ravel()
-
-
-def _plane_normals(cloud: Cloud, tiles: _Tiles) -> Array:
-    """Normals of the planes through the points around each point's tile, (n, 3)."""
-    points = cloud.points - cloud.points.mean(axis=0)
-    count = tiles.sum_around()
-    safe = np.maximum(count, 1.0)
-    mean = np.stack([tiles.sum_around(points[:, a]) for a in range(3)], axis=1)
-    mean /= safe[:, None]
-    spread = np.empty((len(count), 3, 3))
-    for a in range(3):
-        for b in range(a, 3):
-            moment = tiles.sum_around(points[:, a] * points[:, b]) / safe
-            spread[:, a, b] = spread[:, b, a] = moment - mean[:, a] * mean[:, b]
-    values, vectors = np.linalg.eigh(spread)
-    flat = (count >= _MIN_POINTS) & (values[:, 1] > _MIN_SPREAD * values[:, 2])
-    normals = np.where(flat[:, None], vectors[:, :, 0], np.nan)[tiles.of_point]
-    away = np.einsum("ij,ij->i", normals, cloud.rays) > 0.0
-    return np.where(away[:, None], -normals, normals)
-
-
-def _squarest_projector(cloud: Cloud, tiles: _Tiles, normals: Array) -> Mask:
+def _squarest_projector(cloud: Cloud, tiles: Tiles, normals: Array) -> Mask:
     """Points of the projector that meets each tile most squarely, shape (n,)."""
     projectors = np.unique(cloud.projector)
     if len(projectors) < 2:
@@ -99,7 +44,8 @@ def _squarest_projector(cloud: Cloud, tiles: _Tiles, normals: Array) -> Mask:
     for projector in projectors:
         lit = cloud.projector == projector
         count = tiles.sum_around(lit.astype(np.float64))
-        count[~tiles.occupied(lit)] = 0.0
+        # Of tiles that hold none of its points.
+        count[np.bincount(tiles.of_point[lit], minlength=len(count)) == 0] = 0.0
         weighed = tiles.sum_around((lit & known).astype(np.float64))
         total = tiles.sum_around(np.where(lit & known, cosine, 0.0))
         score.append(total / np.maximum(weighed, 1.0))

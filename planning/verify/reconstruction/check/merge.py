@@ -19,12 +19,8 @@ from planning.verify.reconstruction.scanner import Scanner
 
 from .overlaps import compare_overlaps, pixel_sizes
 from .ring_curves import RingCurves
+from .tiles import Tiles, plane_normals
 
-# Normals are of planes within tiles of the image about one ring pitch wide.
-_MIN_TILE_PX, _MAX_TILE_PX = 6, 64
-_MIN_POINTS = 12
-# A plane is one if the points spread in two directions, at most this unevenly.
-_MIN_SPREAD = 0.02
 # From here on it isn't noise but doubt of a pair, which no average makes less [px].
 _DOUBT_PX = 0.5
 # Points of two projectors are of one spot in a cell so large [px].
@@ -95,11 +91,10 @@ def merge(
         noise_px=noise_px * np.where(certain, remaining, 1.0),
     )
     normals = np.full((len(cloud), 3), np.nan)
-    side = int(np.clip(np.ceil(pitch_px), _MIN_TILE_PX, _MAX_TILE_PX))
     for camera in np.unique(cloud.camera[~steps]):
         seen = np.flatnonzero((cloud.camera == camera) & ~steps)
-        tiles = _Tiles.of(cloud.pixels[seen], side)
-        normals[seen] = _plane_normals(fitted.points[seen], cloud.rays[seen], tiles)
+        tiles = Tiles.of(cloud.pixels[seen], pitch_px)
+        normals[seen] = plane_normals(fitted.points[seen], cloud.rays[seen], tiles)
     # In a step there is no surface whose normal would make an error less.
     largest = np.linalg.norm(fitted.shift, axis=1) * fitted.noise_px
     sigma = np.where(doubtful, largest, fitted.sigma(normals))
@@ -148,46 +143,3 @@ def _good_projectors(
     best[order] = np.repeat(order[first], np.diff(first, append=len(order)))
     good = projector == projector[best]
     return good | ((ratio > 1.0) & (known <= ratio * known[best]))
-
-
-@dataclass(frozen=True, eq=False)
-class _Tiles:
-    """Squares of an image, and which of them each point is in."""
-
-    of_point: Indices
-    shape: tuple[int, int]
-
-    @classmethod
-    def of(cls, pixels: Array, side: int) -> "_Tiles":
-        """Lay tiles over the points, with one row and column of empty ones around."""
-        place = np.floor((pixels - pixels.min(axis=0)) / side).astype(np.int64) + 1
-        columns, rows = (place.max(axis=0) + 2).tolist()
-        return cls(place[:, 1] * columns + place[:, 0], (rows, columns))
-
-    def sum_around(self, values: Array | None = None) -> Array:
-        """Return sums over each tile and its eight neighbours, (n_tiles,)."""
-        rows, columns = self.shape
-        summed = np.bincount(self.of_point, values, rows * columns)
-        grid = summed.astype(np.float64).reshape(self.shape)
-        padded = np.pad(grid, 1)
-        wide = padded[:-2] + padded[1:-1] + padded[2:]
-        return (wide[:, :-2] + wide[:, 1:-1] + wide[:, 2:]).ravel()
-
-
-def _plane_normals(points: Array, rays: Array, tiles: _Tiles) -> Array:
-    """Normals of the planes through the points around each point's tile, (n, 3)."""
-    points = points - points.mean(axis=0)
-    count = tiles.sum_around()
-    safe = np.maximum(count, 1.0)
-    mean = np.stack([tiles.sum_around(points[:, a]) for a in range(3)], axis=1)
-    mean /= safe[:, None]
-    spread = np.empty((len(count), 3, 3))
-    for a in range(3):
-        for b in range(a, 3):
-            moment = tiles.sum_around(points[:, a] * points[:, b]) / safe
-            spread[:, a, b] = spread[:, b, a] = moment - mean[:, a] * mean[:, b]
-    values, vectors = np.linalg.eigh(spread)
-    flat = (count >= _MIN_POINTS) & (values[:, 1] > _MIN_SPREAD * values[:, 2])
-    normals = np.where(flat[:, None], vectors[:, :, 0], np.nan)[tiles.of_point]
-    away = np.einsum("ij,ij->i", normals, rays) > 0.0
-    return np.where(away[:, None], -normals, normals)

@@ -1,0 +1,66 @@
+"""Tiles of an image about one ring pitch wide, and the planes of what they show."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planning.verify.reconstruction.arrays import Array, Indices
+
+_MIN_TILE_PX, _MAX_TILE_PX = 6, 64
+_MIN_POINTS = 12
+# A plane is one if the points spread in two directions, at most this unevenly.
+_MIN_SPREAD = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Tiles:
+    """Squares of an image, and which of them each point is in."""
+
+    of_point: Indices
+    shape: tuple[int, int]
+
+    @classmethod
+    def of(cls, pixels: Array, pitch_px: float) -> "Tiles":
+        """Lay tiles over the points, with one row and column of empty ones around."""
+        side = int(np.clip(np.ceil(pitch_px), _MIN_TILE_PX, _MAX_TILE_PX))
+        place = np.floor((pixels - pixels.min(axis=0)) / side).astype(np.int64) + 1
+        columns, rows = (place.max(axis=0) + 2).tolist()
+        return cls(place[:, 1] * columns + place[:, 0], (rows, columns))
+
+    def sum_around(self, values: Array | None = None) -> Array:
+        """Return sums over each tile and its eight neighbours, (n_tiles,)."""
+        rows, columns = self.shape
+        summed = np.bincount(self.of_point, values, rows * columns)
+        grid = summed.astype(np.float64).reshape(self.shape)
+        padded = np.pad(grid, 1)
+        wide = padded[:-2] + padded[1:-1] + padded[2:]
+        return (wide[:, :-2] + wide[:, 1:-1] + wide[:, 2:]).ravel()
+
+
+def plane_normals(points: Array, rays: Array, tiles: Tiles) -> Array:
+    """Return normals of the planes through the points around each point's tile.
+
+    Args:
+        points: In [m], shape (n, 3).
+        rays: Unit directions from the camera to them, shape (n, 3).
+        tiles: Where they lie in the image.
+
+    Returns:
+        Unit normals towards the camera, shape (n, 3); NaN where points are too few, or
+        on a line.
+    """
+    points = points - points.mean(axis=0)
+    count = tiles.sum_around()
+    safe = np.maximum(count, 1.0)
+    mean = np.stack([tiles.sum_around(points[:, a]) for a in range(3)], axis=1)
+    mean /= safe[:, None]
+    spread = np.empty((len(count), 3, 3))
+    for a in range(3):
+        for b in range(a, 3):
+            moment = tiles.sum_around(points[:, a] * points[:, b]) / safe
+            spread[:, a, b] = spread[:, b, a] = moment - mean[:, a] * mean[:, b]
+    values, vectors = np.linalg.eigh(spread)
+    flat = (count >= _MIN_POINTS) & (values[:, 1] > _MIN_SPREAD * values[:, 2])
+    normals = np.where(flat[:, None], vectors[:, :, 0], np.nan)[tiles.of_point]
+    away = np.einsum("ij,ij->i", normals, rays) > 0.0
+    return np.where(away[:, None], -normals, normals)
