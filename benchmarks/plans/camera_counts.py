@@ -22,13 +22,11 @@ import platform
 import statistics
 import sys
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
-from support import shared_meshes
 
+from benchmarks.bounds.continuous_bounds import jobs
 from geometry.curvature.refinement import cut_for_curvature
 from geometry.mesh.mesh import TriangleMesh
 from planning import load_mesh, load_rig, verify_plan
@@ -50,7 +48,6 @@ from planning.scene.scene import Scene
 from planning.stages import first_projectors, polished
 from planning.verify.audit.audit import audit_plan
 
-ROOT = Path(__file__).resolve().parents[2]
 _PROJECTORS = 3
 # Samples that neither cover nor slides saw.
 _FRESH, _STREAM = 12_000, 900
@@ -99,7 +96,8 @@ def main() -> int:
     )
     print(f"| {' | '.join(_HEAD)} |\n|{len(_HEAD) * '---|'}")
     found: list[Found] = []
-    for name, mesh, up in _meshes(names):
+    for path, options, up in jobs(names):
+        name, mesh = path.name, load_mesh(path, **options)
         begin = time.process_time()
         job = _job(mesh, up)
         by_default = _by_default(job)
@@ -124,17 +122,6 @@ def _print_totals(found: list[Found]) -> None:
             f"median of {len(gains)}; the measured share falls by at most "
             f"{100 * max(f.lost for f in found):.2f} points."
         )
-
-
-def _meshes(names: list[str]) -> Iterator[tuple[str, TriangleMesh, str | None]]:
-    if not names or "face.obj" in names:
-        yield "face.obj", load_mesh(ROOT / "face.obj"), None
-    table = shared_meshes
-    for mesh in table.MESHES if table.FOLDER.is_dir() else ():
-        if not names or mesh.path.name in names:
-            words = mesh.words
-            up = words[words.index("--up") + 1] if "--up" in words else None
-            yield mesh.path.name, load_mesh(mesh.path, **mesh.options), up
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,12 +18,9 @@ and those of which the fresh samples miss it, since a plan then gets one more.
 
 import argparse
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path
 
-from support import shared_meshes
-
+from benchmarks.bounds.continuous_bounds import jobs
 from geometry.curvature.refinement import cut_for_curvature
 from geometry.mesh.mesh import TriangleMesh
 from planning import load_mesh, load_rig
@@ -37,7 +34,6 @@ from planning.scene.draws import DRAWS
 from planning.scene.samples import Target
 from planning.stages import bounded_projectors, first_projectors
 
-ROOT = Path(__file__).resolve().parents[2]
 FLOORS = (0.0, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8)
 _MANY = 20
 
@@ -60,22 +56,25 @@ def main() -> int:
     parser.add_argument("--floors", nargs="+", type=float, default=FLOORS)
     parser.add_argument("--share", type=float, default=None)
     given = parser.parse_args()
+    # What floors cost is against the plan without.
+    floors = sorted({0.0, *given.floors})
     print(
         "| mesh | large regions | F | projectors | bound (candidates, all poses) "
         "| worst region lit | lit | CPU [s] |\n|---|---|---|---|---|---|---|---|"
     )
     every: list[dict[float, Found]] = []
-    for name, mesh, up in _meshes(given.names):
+    for path, options, up in jobs(given.names):
+        name, mesh = path.name, load_mesh(path, **options)
         every.append({})
         before: Found | None = None
-        for floor in sorted(given.floors):
+        for floor in floors:
             again = before is None or before.worst < floor
             if again:
                 before, regions = _planned(mesh, up, floor, given.share)
             every[-1][floor] = before
             print(_row(name, regions, floor, before, again), flush=True)
     print("\n| F | costs a projector on |\n|---|---|")
-    for floor in sorted(given.floors):
+    for floor in floors:
         dearer = sum(
             found[floor].count > found[0.0].count or found[floor].worst < floor
             for found in every
@@ -90,17 +89,6 @@ def _row(name: str, regions: int, floor: float, found: Found, again: bool) -> st
     cells = (name, regions, f"{floor:g}", found.count, bounds)
     shares = f"{found.worst:.1%} | {found.lit:.1%}"
     return f"| {' | '.join(map(str, cells))} | {shares} | {spent} |"
-
-
-def _meshes(names: list[str]) -> Iterator[tuple[str, TriangleMesh, str | None]]:
-    if not names or "face.obj" in names:
-        yield "face.obj", load_mesh(ROOT / "face.obj"), None
-    table = shared_meshes
-    for mesh in table.MESHES if table.FOLDER.is_dir() else ():
-        if not names or mesh.path.name in names:
-            words = mesh.words
-            up = words[words.index("--up") + 1] if "--up" in words else None
-            yield mesh.path.name, load_mesh(mesh.path, **mesh.options), up
 
 
 def _planned(
