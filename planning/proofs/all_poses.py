@@ -1,6 +1,7 @@
 """What was proved over all poses of the workspace, and how a certificate says it."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,14 @@ from solvers.cells.cell_bound import CellBound, CellStatus, bound_count
 from solvers.cells.cell_problem import CellProblem
 from solvers.cells.cell_tree import CellTree
 
+from .candidate_certificate import least_for_total
 from .quotas import Quotas, RegionFloors
+
+_STATUS: dict[CellStatus, Literal["proved", "survived", "cut"]] = {
+    CellStatus.PROVED: "proved",
+    CellStatus.SURVIVED: "survived",
+    CellStatus.CUT: "cut",
+}
 
 
 @dataclass(frozen=True)
@@ -143,7 +151,7 @@ class ContinuousBound:
             most = min(most, float(found.problem.required_weight[0]) - 1.0)
         return ContinuousProof(
             lower_bound=int(found.lower_bound) + question.n_existing,
-            status=found.status.name.lower(),
+            status=_STATUS[found.status],
             proof=found.proof,
             occlusion=self.shadows,
             n_samples=question.n_samples,
@@ -175,13 +183,18 @@ def joined(certificate: Certificate, bound: ContinuousProof) -> Certificate:
     if bound.n_samples != before.n_samples or least <= needed.lower_bound:
         return before
     optimal = before.status == "feasible" and least >= before.count
-    return _fewer_capped(before, bound.one_fewer_upper_bound_m2).changed(
+    after = _fewer_capped(before, bound.one_fewer_upper_bound_m2)
+    candidates = before.candidates.changed(
+        lower_bound=min(least, before.count), proof=f"over all poses: {bound.proof}"
+    )
+    if candidates.for_total is not None:
+        total = min(least_for_total(after.by_count, after.required_m2), least)
+        total = max(total, candidates.for_total)
+        candidates = candidates.changed(for_total=total)
+    return after.changed(
         status="optimal" if optimal else before.status,
         needed=needed.changed(lower_bound=least),
-        candidates=before.candidates.changed(
-            lower_bound=min(least, before.count),
-            proof=f"over all poses: {bound.proof}",
-        ),
+        candidates=candidates,
     )
 
 

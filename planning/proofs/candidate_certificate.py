@@ -85,11 +85,8 @@ def certified(
         proof=selection.proof,
     )
     if selection.floors is not None:
-        # So many candidates cover too little at most: it takes one more.
-        few = [
-            n for n, (_, most) in others.n_covered.items() if most < selection.required
-        ]
-        least = max(selection.total_bound, 1 + max(few, default=0))
+        required = selection.required * sample_area_m2
+        least = max(selection.total_bound, least_for_total(areas, required))
         bound = bound.changed(for_total=min(least, selection.lower_bound))
     proof = Certificate(
         count=count,
@@ -111,6 +108,13 @@ def certified(
     }
     given = {key: value for key, value in extras.items() if value is not None}
     return others.by_count, proof.changed(**given)
+
+
+def least_for_total(by_count: tuple[CountArea, ...], required_m2: float) -> int:
+    """Return the least number of which it isn't said that it covers too little."""
+    short = required_m2 * (1.0 - 1e-9)
+    few = (row.count for row in by_count if row.upper_bound_m2 < short)
+    return 1 + max(few, default=0)
 
 
 def _best_area(by_count: tuple[CountArea, ...], count: int) -> BestArea:

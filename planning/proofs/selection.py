@@ -115,6 +115,11 @@ class CandidateCover:
         return self._quotas(_AIMED)
 
     @property
+    def floors(self) -> Quotas | None:
+        """The same where any region has a floor; else None."""
+        return self.quotas if self.quotas.floors.any() else None
+
+    @property
     def required(self) -> int:
         """Samples that must be covered, of regions and all."""
         return self.quotas.total
@@ -230,7 +235,7 @@ def select_fewest(
         n_covered,
         bound,
         min(int(np.ceil(solution.total_bound - 1e-9)), needed),
-        floors=cover.quotas if cover.quotas.floors.any() else None,
+        floors=cover.floors,
     )
 
 

@@ -44,7 +44,7 @@ from planning.scene.lights import ring_frame
 from planning.scene.measured import lit_samples, measured_by
 from planning.verify.audit.audit import audit_plan
 from planning.verify.audit.audit_findings import AuditFindings
-from planning.verify.audit.counts.certificate_claims import audit_routes
+from planning.verify.audit.counts.route_claims import audit_routes
 
 RADIUS = 0.1
 

@@ -550,6 +550,11 @@ def test_a_bound_over_all_poses_raises_that_over_candidates_and_lowers_areas():
     short = all_poses.joined(proof.changed(count=2, status="infeasible"), bound)
     assert short.best_area.upper_bound_m2 == 2.5
     assert (short.status, short.candidates.lower_bound) == ("infeasible", 2)
+    # The total alone takes three where two cover less than it.
+    floored = proof.changed(
+        required_m2=2.7, candidates=proof.candidates.changed(for_total=2)
+    )
+    assert all_poses.joined(floored, bound).candidates.for_total == 3
     # What speaks of other samples stays beside it.
     apart = all_poses.joined(proof, bound.changed(n_samples=90))
     assert apart.needed.lower_bound == 2

@@ -318,8 +318,8 @@ def _claim(document: dict[str, Any], surface: Surface) -> None:
         coverage[name] = {cause: value for cause, value in split.items() if value > 0}
     document["coverage"] = coverage
     _claim_devices(document, rows, area, inside)
-    _claim_regions(document, surface, rows, faces)
-    _claim_tables(document, surface, area, everything, inside)
+    shares = _claim_regions(document, surface, rows, faces)
+    _claim_tables(document, shares, area, everything, inside)
     document["baselines"] = _baselines(document, surface.mesh)
     shared = area(lambda row: all(row["seen"]), inside)
     together = shared >= 0.01 * coverage["target"]["area_m2"]
@@ -619,8 +619,10 @@ def _cone_angle(surface: Surface, members: np.ndarray) -> float:
 
 def _claim_regions(
     document: Any, surface: Surface, rows: Any, faces: np.ndarray
-) -> None:
+) -> list[dict[int, float]]:
+    """Claim them; return by region what one and two projectors light of its reach."""
     document["regions"] = []
+    shares: list[dict[int, float]] = [{}, {}]
     limits, areas = document["requirements"], surface.mesh.face_areas
     for number in (0, 1):
         members = surface.region == number
@@ -653,9 +655,14 @@ def _claim_regions(
                 "coverage": _region_coverage(mine, limits["region_coverage"]),
             }
         )
+        reach = sum(weight for row, weight in mine if row["by_projectors"])
+        for n, lit in enumerate(shares if reach else (), start=1):
+            some = [weight for row, weight in mine if any(row["lit_by"][:n])]
+            lit[number] = sum(some) / reach
     document["surface"]["dominant_share"] = float(
         areas[surface.in_dominant].sum() / areas.sum()
     )
+    return shares
 
 
 def _region_coverage(mine: Any, share: float) -> dict[str, Any]:
@@ -684,7 +691,11 @@ def _region_coverage(mine: Any, share: float) -> dict[str, Any]:
 
 
 def _claim_tables(
-    document: Any, surface: Surface, area: Any, everything: Any, inside: Any
+    document: Any,
+    shares: list[dict[int, float]],
+    area: Any,
+    everything: Any,
+    inside: Any,
 ) -> None:
     parts = (("target", inside), ("surface", everything))
     document["marginal"] = [
@@ -699,16 +710,9 @@ def _claim_tables(
         )
         for n in (1, 2)
     ]
-    shares = {
-        region["id"]: areas["lit_m2"] / areas["reachable_by_projectors_m2"]
-        for region in document["regions"]
-        if (areas := region["coverage"])["reachable_by_projectors_m2"] > 0.0
-    }
-    worst = min(shares, key=lambda number: shares[number], default=None)
-    document["marginal"][1] |= {
-        "worst_region": worst,
-        "worst_region_lit": shares.get(worst),
-    }
+    for row, lit in zip(document["marginal"], shares, strict=False):
+        worst = min(lit, key=lambda number: lit[number], default=None)
+        row |= {"worst_region": worst, "worst_region_lit": lit.get(worst)}
     target, limits = document["coverage"]["target"], document["requirements"]
     document["certificates"] = {
         kind: {
@@ -717,7 +721,11 @@ def _claim_tables(
             "required_m2": share * target[of],
             "n_samples": document["coverage"]["samples"],
             "floors": 2,
-            "candidates": {"lower_bound": 1, "n_candidates": candidates},
+            "candidates": {
+                "lower_bound": 1,
+                "n_candidates": candidates,
+                "for_total": 1,
+            },
             "continuous": None,
             "greedy_count": 3,
             "needed": {"count": 2, "lower_bound": 1},

@@ -268,4 +268,6 @@ def _selection(scene: Scene, samples: LitSamples, route: RouteCameras) -> Select
         cover.required,
         cover.n_covered(chosen),
         most,
+        min(int(np.ceil(bound.total_bound - 1e-9)), needed),
+        floors=cover.floors,
     )

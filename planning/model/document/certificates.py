@@ -1,10 +1,13 @@
 """`certificates`: what was proved of the numbers of devices, and over what."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from .part import Part
+
+# A number of devices, poses, samples or cells.
+Count = Annotated[int, Field(ge=0)]
 
 
 class CandidateBound(Part):
@@ -15,16 +18,18 @@ class CandidateBound(Part):
             regions; absent: no region has a floor.
     """
 
-    lower_bound: int
-    n_candidates: int
+    lower_bound: Count
+    n_candidates: Count
     proof: str = ""
-    for_total: int | None = None
+    for_total: Count | None = None
 
 
 class ContinuousProof(Part):
     """What was proved over all poses of the workspace.
 
     Attributes:
+        status: Whether it refutes fewer devices than are needed; or stopped, because
+            cells that can't be split don't, or at a limit.
         occlusion: Whether shadows took part.
         n_samples: Samples that the bound speaks of.
         n_reached: Those of them that some candidate covers.
@@ -32,13 +37,13 @@ class ContinuousProof(Part):
             poses; None: not known.
     """
 
-    lower_bound: int
-    status: str
+    lower_bound: Count
+    status: Literal["proved", "survived", "cut"]
     proof: str
     occlusion: bool
-    n_samples: int
-    n_reached: int
-    n_cells: int
+    n_samples: Count
+    n_reached: Count
+    n_cells: Count
     one_fewer_upper_bound_m2: float | None
 
 
@@ -52,8 +57,8 @@ class NeededCount(Part):
         relaxations: Single changes with which they would be.
     """
 
-    count: int
-    lower_bound: int
+    count: Count
+    lower_bound: Count
     wider_field: str | None = None
     relaxations: tuple[str, ...] = ()
 
@@ -61,7 +66,7 @@ class NeededCount(Part):
 class CountArea(Part):
     """What so many candidates cover: found, and at most."""
 
-    count: int
+    count: Count
     value_m2: float
     upper_bound_m2: float
 
@@ -88,8 +93,8 @@ class RouteCounts(Part):
     """Cameras by either route, and which was taken; None: it has no answer."""
 
     asked: CamerasBy
-    cover: int | None
-    paper: int | None
+    cover: Count | None
+    paper: Count | None
     taken: Literal["cover", "paper"]
     why: str
 
@@ -112,23 +117,23 @@ class Certificate(Part):
         n_regions: Regions of the target.
     """
 
-    count: int
+    count: Count
     status: Literal["optimal", "feasible", "infeasible"]
     required_m2: float
-    n_samples: int
+    n_samples: Count
     candidates: CandidateBound
     continuous: ContinuousProof | None
-    greedy_count: int
+    greedy_count: Count
     needed: NeededCount
     by_count: tuple[CountArea, ...] = ()
     best_area: BestArea
     one_fewer: OneFewer | None
-    given: int = 0
-    but_for_bodies: int = 0
+    given: Count = 0
+    but_for_bodies: Count = 0
     bounds_leave_out: str = ""
-    excluded_pairs: dict[str, int] = Field(default={})
-    n_regions: int = 0
-    floors: int = 0
+    excluded_pairs: dict[str, Count] = Field(default={})
+    n_regions: Count = 0
+    floors: Count = 0
     routes: RouteCounts | None = None
 
 

@@ -62,9 +62,15 @@ class Cloud(Columns):
         lens moves it, and normals are estimated from few points around. Without both
         the surest points would seem surer than they are (docs/method/accuracy.md).
         """
+        return self.per_pixel(normals) * np.hypot(self.noise_px, TEXTURE_PX)
+
+    def per_pixel(self, normals: Array) -> Array:
+        """Return how far each point moves along a normal with its edge [m/px], (n,).
+
+        At least a share of all that it moves, for normals are estimated.
+        """
         along = np.einsum("ij,ij->i", self.shift, normals)
-        astray = _NORMAL_RAD * np.linalg.norm(self.shift, axis=1)
-        return np.hypot(along, astray) * np.hypot(self.noise_px, TEXTURE_PX)
+        return np.hypot(along, _NORMAL_RAD * np.linalg.norm(self.shift, axis=1))
 
     @staticmethod
     def empty() -> "Cloud":

@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from geometry.mesh.sampling import sample_surface
 from planning.verify.reconstruction.check.accuracy import (
     Expected,
@@ -12,7 +10,7 @@ from planning.verify.reconstruction.check.accuracy import (
     measure_completeness,
 )
 from planning.verify.reconstruction.check.merge import Merged, merge
-from planning.verify.reconstruction.check.overlaps import pixel_sizes
+from planning.verify.reconstruction.check.overlaps import ring_pitch_px
 from planning.verify.reconstruction.check.result import PairCount, Reconstruction
 from planning.verify.reconstruction.decode.decode import Pairs
 from planning.verify.reconstruction.density.second_sequence import (
@@ -171,7 +169,7 @@ def conclude(
     spent, everything = spent or Spent(), _everything(decoded)
     with spent.on("merge"):
         lit = {pair: gave.lit for pair, gave in decoded}
-        merged = merge(everything, plan, lit, pitch_px=_ring_pitch(plan, everything))
+        merged = merge(everything, plan, lit, pitch_px=ring_pitch_px(everything, plan))
     within = expected.within(plan.target)
     return _judged(plan, decoded, merged, within, photometry, spent)
 
@@ -220,15 +218,3 @@ def _judged(
         failures,
         spent.seconds,
     )
-
-
-def _ring_pitch(plan: Scanner, cloud: Cloud) -> float:
-    """Median distance of neighbouring rings in images [px]."""
-    if len(cloud) == 0:
-        return 1.0
-    gaps = np.empty(len(cloud))
-    for p, projector in enumerate(plan.projectors):
-        chosen = cloud.projector == p
-        rings, depth = cloud.ring[chosen], projector.to_ring(cloud.points[chosen])[:, 2]
-        gaps[chosen] = projector.pattern.gaps_m(rings, depth)
-    return float(np.median(gaps / pixel_sizes(cloud, plan)))

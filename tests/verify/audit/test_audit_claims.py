@@ -126,22 +126,26 @@ def _swapped(split):
     return {"sigma": sum(split.values())}
 
 
-def _anywhere(least):
+def _anywhere(least, **values):
     """A proof over all poses, of the certificate's samples unless they are changed."""
 
     def proof(_, most=None):
         return {
             "lower_bound": least,
-            "status": "optimal",
+            "status": "proved",
             "proof": "exhausted",
             "occlusion": True,
             "n_samples": 5120,
             "n_reached": 5120,
             "n_cells": 10,
             "one_fewer_upper_bound_m2": most,
-        }
+        } | values
 
     return proof
+
+
+def _of_all_poses(**values):
+    return _at("certificates", "projectors", "continuous", _anywhere(1, **values))
 
 
 CHECKED = dict.fromkeys(
@@ -402,8 +406,31 @@ FALSE = {
         _at("certificates", "projectors", "best_area", "upper_bound_m2", 0.02),
         "best_area.upper_bound_m2: 200.00 cm² exceeds the ",
     ),
+    "samples of all poses": (
+        _of_all_poses(n_samples=10**6),
+        "continuous.n_samples: 1000000 must be some of the certificate's",
+    ),
+    "reached": (_of_all_poses(n_reached=2000), "continuous.n_reached: claimed 2000 s"),
+    "reached by more": (_of_all_poses(n_samples=5000), "n_reached: 5120 of 5000"),
+    "survived": (
+        _of_all_poses(lower_bound=2, status="survived"),
+        "continuous.status: 'survived' is claimed of 2, and 2 are needed",
+    ),
+    "greedy few": (
+        _at("certificates", "projectors", "greedy_count", 0),
+        "projectors.greedy_count: 0 must lie between 1, which are needed, and 38",
+    ),
+    "greedy many": (
+        _at("certificates", "projectors", "greedy_count", 60),
+        "projectors.greedy_count: 60 must lie between",
+    ),
     "one fewer": (
-        _at("certificates", "projectors", "candidates", "lower_bound", 2),
+        _at(
+            "certificates",
+            "projectors",
+            "candidates",
+            lambda bound: bound | {"lower_bound": 2, "for_total": 2},
+        ),
         "2 are claimed to be the fewest",
     ),
     "light": (_at("rig", "light", "parallel"), "but rig.light is 'parallel'"),
@@ -497,6 +524,11 @@ MALFORMED = {
     "nan": (_at("coverage", "target", "lit_m2", math.nan), "lit_m2 = nan should be"),
     "no rig": (_at("rig", "camera", None), "rig.camera = None should be"),
     "status": (_at("certificates", "cameras", "status", "great"), "'great' should be"),
+    "status of all poses": (_of_all_poses(status="great"), "'great' should be"),
+    "cells": (_of_all_poses(n_cells=-1), "n_cells = -1 should be"),
+    "reached": (_of_all_poses(n_reached=-1), "n_reached = -1 should be"),
+    "samples": (_at("certificates", "cameras", "n_samples", -1), "-1 should be"),
+    "greedy": (_at("certificates", "cameras", "greedy_count", -1), "-1 should be"),
     "beta list": (_at("baselines", 0, "beta", 0.1), "baselines.0.beta = 0.1 should be"),
     "no groups": (_at("camera_groups", None), "camera_groups = None should be"),
     "no limits": (_at("rig", "limits", None), "rig.limits = None should be"),
@@ -649,6 +681,12 @@ def test_what_other_numbers_cover_is_held_against_the_table(handmade):
 
 def test_a_superfluous_device_refutes_the_bound(handmade):
     def change(document):
+        document["requirements"]["region_coverage"] = 0.0
+        for kind in ("projectors", "cameras"):
+            document["certificates"][kind]["floors"] = 0
+            document["certificates"][kind]["candidates"]["for_total"] = None
+        for region in document["regions"]:
+            region["coverage"]["floor"] = None
         document["certificates"]["projectors"]["candidates"]["lower_bound"] = 2
         document["certificates"]["projectors"]["status"] = "optimal"
         document["certificates"]["projectors"]["one_fewer"]["upper_bound_m2"] = 0.0

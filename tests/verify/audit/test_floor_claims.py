@@ -138,6 +138,10 @@ LIES = {
         _row(1, worst_region=None, worst_region_lit=None),
         "marginal.projectors.2.worst_region_lit: None is claimed",
     ),
+    "worst share without a region": (
+        _row(0, worst_region=None),
+        "marginal.projectors.1.worst_region: None at ",
+    ),
     "worst of another count": (
         _row(0, worst_region=7, worst_region_lit=0.5),
         "marginal.projectors.1.worst_region: 7 at 0.5 must be a large region",
@@ -158,6 +162,10 @@ def _certificate(**values):
     return change
 
 
+# No device covers nothing.
+ROW_OF_NONE = [{"count": 0, "value_m2": 0.0, "upper_bound_m2": 0.0}]
+
+
 def certified(case, plan) -> list[str]:
     findings = AuditFindings()
     audit_certificates(replace(case, plan=plan), findings)
@@ -170,6 +178,11 @@ def certified(case, plan) -> list[str]:
         ({"floors": 1}, "certificates.projectors.floors: claimed 1"),
         ({"floors": 0}, "certificates.projectors.floors: claimed 0"),
         ({"for_total": 2}, "for_total: 2 is claimed without floors, but only 1 with"),
+        ({"for_total": None}, "for_total: None is claimed beside 1, but 2 regions"),
+        (
+            {"for_total": 0, "by_count": ROW_OF_NONE},
+            "for_total: 0 is claimed, but by_count says that 0 cover too little",
+        ),
     ],
 )
 def test_a_certificate_speaks_of_every_floor(case, handmade, values, sentence):
@@ -181,7 +194,7 @@ def test_a_certificate_speaks_of_every_floor(case, handmade, values, sentence):
     ("floor", "total", "refuted"),
     [
         # One projector is enough for a tenth, but leaves a region darker than that.
-        (0.6, None, None),
+        (0.6, 1, None),
         (0.6, 2, "for_total"),
         (0.0, None, "lower_bound"),
     ],
@@ -196,8 +209,7 @@ def test_a_floor_may_take_the_device_that_the_total_does_not(
         proof = proofs["projectors"]
         proof |= {"required_m2": 0.1 * reached, "floors": 2 if floor else 0}
         proofs["cameras"]["floors"] = 2 if floor else 0
-        proof["candidates"] |= {"lower_bound": 2}
-        proof["candidates"] |= {} if total is None else {"for_total": total}
+        proof["candidates"] |= {"lower_bound": 2, "for_total": total}
         proof["one_fewer"]["upper_bound_m2"] = 0.0
 
     found = certified(case, handmade.tampered(case.plan, change))

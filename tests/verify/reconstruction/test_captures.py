@@ -482,7 +482,8 @@ def test_a_deep_dent_that_two_pairs_saw_is_certain_and_one_pairs_word_is_not(job
 
     found = stood_there(job, alone, mesh=other)
     assert any("doubtful: far off the mesh" in sentence for sentence in found.failures)
-    dent = np.abs(found.accuracy.distances) > 1e-3
+    # Beyond noise.
+    dent = np.abs(found.accuracy.distances) > 1.1e-3
     assert np.any(dent)
     assert found.merged.cloud.noise_px[dent].min() >= AGREE_PX
     assert np.median(found.merged.cloud.noise_px[~dent]) < 0.1 * AGREE_PX

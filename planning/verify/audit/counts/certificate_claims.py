@@ -8,6 +8,7 @@ from planning.verify.audit.audit_case import AuditCase, DeviceKind
 from planning.verify.audit.audit_findings import AuditFindings, square_centimetres
 from planning.verify.audit.estimates import POINT, ROUNDING
 
+from .route_claims import audit_routes
 from .table_claims import marginal_of
 
 # Covers are chosen on fewer samples than areas are claimed from.
@@ -21,8 +22,9 @@ def audit_certificates(case: AuditCase, findings: AuditFindings) -> None:
         slack = case.estimator.tolerance(chosen, case.estimator.target_m2)
         below = findings.at(f"certificates.{kind.name}s")
         _audit_counts(kind, below)
-        _audit_floors(kind.proof, case, below)
-        _audit_continuous(kind.proof, below)
+        _audit_floors(kind, case, below)
+        _audit_greedy(kind.proof, below)
+        _audit_continuous(kind, case, below)
         _audit_areas(kind, slack, case, below)
         _audit_by_count(kind, case, below)
         _audit_bodies(kind, below)
@@ -45,9 +47,9 @@ def _audit_counts(kind: DeviceKind, findings: AuditFindings) -> None:
     ):
         least = 0 if proof is None else proof.lower_bound
         findings.holds(
-            least >= 0 and (least <= count or not met),
+            least <= count or not met,
             f"{scope}.lower_bound",
-            f"{least} exceeds the count of {count}, or is negative",
+            f"{least} exceeds the count of {count}",
         )
     findings.holds(
         claims.status != "optimal" or bound == count,
@@ -66,27 +68,95 @@ def _audit_counts(kind: DeviceKind, findings: AuditFindings) -> None:
     )
 
 
-def _audit_floors(
-    claims: Certificate, case: AuditCase, findings: AuditFindings
-) -> None:
-    """Check of how many regions the count is said to meet the floor."""
-    asked = case.plan.requirements.region_coverage > 0.0
-    truth = len(case.large_regions) if asked else 0
+def _audit_floors(kind: DeviceKind, case: AuditCase, findings: AuditFindings) -> None:
+    """Check of how many regions the count is said to meet the floor, and `for_total`.
+
+    Where candidates of a number cover too little at most, it takes one more.
+    """
+    claims, asked = kind.proof, case.plan.requirements.region_coverage
+    truth = len(case.large_regions) if asked > 0.0 else 0
     findings.number("floors", claims.floors, truth, 0.0, "regions")
     total, least = claims.candidates.for_total, claims.candidates.lower_bound
+    if total is None:
+        # Of what hardly anything can be reached no sample may be asked for.
+        findings.holds(
+            least == 0
+            or not any(
+                asked * getattr(region.coverage, f"reachable_by_{kind.name}s_m2")
+                > POINT * region.area_m2
+                for region in case.plan.document.regions
+                if region.id in case.large_regions and region.coverage is not None
+            ),
+            "candidates.for_total",
+            f"None is claimed beside {least}, but {truth} regions have a floor",
+        )
+        return
+    most = max(least, claims.needed.lower_bound)
+    required = claims.required_m2 * (1.0 - ROUNDING)
+    few = [row.count for row in claims.by_count if row.upper_bound_m2 < required]
     findings.holds(
-        total is None or 0 <= total <= max(least, claims.needed.lower_bound),
+        total <= most,
         "candidates.for_total",
         f"{total} is claimed without floors, but only {least} with them",
     )
+    findings.holds(
+        total >= min(1 + max(few, default=0), most),
+        "candidates.for_total",
+        f"{total} is claimed, but by_count says that {max(few, default=0)} cover too "
+        f"little",
+    )
 
 
-def _audit_continuous(claims: Certificate, findings: AuditFindings) -> None:
-    """What holds for all poses holds for the candidates too, on equal samples."""
+def _audit_greedy(claims: Certificate, findings: AuditFindings) -> None:
+    """Check that the greedy cover is no smaller than any, nor larger than it can be.
+
+    Greedy covers of n samples take at most 1 + ln n times the fewest sets (Wolsey
+    1982); once for the total, and once for what floors lack then.
+    """
+    least, n = claims.needed.lower_bound, max(claims.n_samples, 1)
+    most = 2.0 * (1.0 + np.log(n)) * max(claims.needed.count, 1)
+    findings.holds(
+        least <= claims.greedy_count <= most,
+        "greedy_count",
+        f"{claims.greedy_count} must lie between {least}, which are needed, and "
+        f"{most:.0f}",
+    )
+
+
+def _audit_continuous(
+    kind: DeviceKind, case: AuditCase, findings: AuditFindings
+) -> None:
+    """What holds for all poses holds for the candidates too, on equal samples.
+
+    The candidates are the reference poses, so that they reach as large a share.
+    """
+    claims = kind.proof
     table = claims.continuous
     if table is None:
         return
-    same = table.n_samples == claims.n_samples
+    samples, below = table.n_samples, findings.at("continuous")
+    below.holds(
+        1 <= samples <= claims.n_samples,
+        "n_samples",
+        f"{samples} must be some of the certificate's {claims.n_samples}",
+    )
+    target = case.plan.coverage.target
+    whole = target.area_m2 if kind.name == "projector" else target.lit_m2
+    if whole > 0.0:
+        share = kind.reachable_m2 / whole
+        slack = max(samples, 1) * _noise(samples, share, 1.0)
+        below.number("n_reached", table.n_reached, samples * share, slack, "samples")
+    below.holds(
+        table.n_reached <= samples, "n_reached", f"{table.n_reached} of {samples}"
+    )
+    proved, least, needed = table.status == "proved", table.lower_bound, claims.needed
+    # One device more than was proved may have come in for fresh samples.
+    below.holds(
+        proved == (least == needed.count) or (proved and claims.status == "feasible"),
+        "status",
+        f"{table.status!r} is claimed of {least}, and {needed.count} are needed",
+    )
+    same = samples == claims.n_samples
     here = claims.needed.lower_bound if same else claims.needed.count
     findings.holds(
         table.lower_bound <= here,
@@ -116,7 +186,7 @@ def _audit_areas(
     required = kind.share * kind.reachable_m2
     findings.number("required_m2", claims.required_m2, required, slack)
     best, fewer = claims.best_area.upper_bound_m2, claims.one_fewer
-    room = _noise(claims, kind.reachable_m2, whole)
+    room = _noise(claims.n_samples, kind.reachable_m2, whole)
     findings.holds(
         best <= kind.reachable_m2 + room,
         "best_area.upper_bound_m2",
@@ -163,7 +233,7 @@ def _audit_by_count(kind: DeviceKind, case: AuditCase, findings: AuditFindings) 
             findings.at(name).numbers(entry, truth, ROUNDING * whole, "m²")
     for number, area in marginal_of(case.plan, kind.name, "target"):
         upper = np.inf if number == count else most.get(number, np.inf)
-        room = _noise(claims, upper, whole)
+        room = _noise(claims.n_samples, upper, whole)
         findings.holds(
             area <= upper + room,
             "by_count",
@@ -173,9 +243,9 @@ def _audit_by_count(kind: DeviceKind, case: AuditCase, findings: AuditFindings) 
         )
 
 
-def _noise(claims: Certificate, area_m2: float, whole: float) -> float:
-    """A point, and three standard errors of an area from the certificate's samples."""
-    n = max(claims.n_samples, _FEWEST_SAMPLES)
+def _noise(n_samples: int, area_m2: float, whole: float) -> float:
+    """A point, and three standard errors of an area from so many samples."""
+    n = max(n_samples, _FEWEST_SAMPLES)
     p = min(max(area_m2 / whole, 1.0 / n), 1.0 - 1.0 / n)
     return whole * (POINT + 3.0 * float(np.sqrt(p * (1.0 - p) / n)))
 
@@ -251,49 +321,3 @@ def _audit_refuted(
                     f"required",
                 )
                 return
-
-
-def audit_routes(proof: Certificate, findings: AuditFindings) -> None:
-    """Check counts of the two routes to the cameras against the certificate.
-
-    The cameras of the route that wasn't taken aren't in the plan, so its count can only
-    be held against what else is claimed: a bound over candidates that hold the cameras
-    of either route is no higher than the count of either, and the smaller is taken.
-    """
-    findings = findings.at("routes")
-    routes, needed = proof.routes, proof.needed
-    if routes is None or not findings.holds(
-        routes.asked in (routes.taken, "both"),
-        "",
-        f"{routes.taken!r} is taken where {routes.asked!r} was asked for",
-    ):
-        return
-    counts = {"cover": routes.cover, "paper": routes.paper}
-    for kind, count in counts.items():
-        if count is None:
-            continue
-        findings.holds(
-            count >= 1 and routes.asked in (kind, "both"),
-            kind,
-            f"{count!r} must be a number of cameras, or null where {routes.asked!r} "
-            f"was asked for",
-        )
-        findings.holds(
-            needed.lower_bound <= count,
-            "",
-            f"a route needs {count} cameras, but at least {needed.lower_bound} are "
-            f"claimed to be needed",
-        )
-    taken = counts[routes.taken]
-    if taken is None:
-        met = proof.status != "infeasible"
-        findings.holds(not met, "", "the route that was taken has no count")
-        return
-    least = min(count for count in counts.values() if count is not None)
-    findings.holds(taken == least, "", f"{taken} cameras are taken instead of {least}")
-    # One more than the route needs may have come in for fresh samples, unproved.
-    findings.holds(
-        needed.count == taken or (proof.status == "feasible" and needed.count > taken),
-        "",
-        f"the route that was taken needs {taken}, the certificate says {needed.count}",
-    )

@@ -205,10 +205,13 @@ def _audit_worst(case: AuditCase, large: set[int], findings: AuditFindings) -> N
                 f"{row.worst_region!r} is claimed, lit {whose!r}, but the least "
                 f"share of a large region is {least:.6g}",
             )
-        elif row.worst_region is not None:
-            share = row.worst_region_lit
+        elif shares or row.worst_region is not None:
+            worst, share = row.worst_region, row.worst_region_lit
             below.holds(
-                row.worst_region in large and share is not None and 0 <= share <= 1,
+                worst in large and share is not None and 0 <= share <= 1,
                 "worst_region",
-                f"{row.worst_region!r} at {share!r} must be a large region and a share",
+                f"{worst!r} at {share!r} must be a large region and a share",
             )
+        else:
+            share = row.worst_region_lit
+            below.holds(share is None, "worst_region", f"None is lit {share!r}")

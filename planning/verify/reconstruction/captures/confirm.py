@@ -24,12 +24,12 @@ from planning.verify.reconstruction.decode.decode import (
 )
 from planning.verify.reconstruction.scanner import Scanner
 
-from .agreement import AGREE_PX, Agreement, upper_px
+from .agreement import AGREE_PX, SIGMAS, Agreement, upper_px
 
 _MM = 1e3
 # Beyond this residual images are of other devices, or poses of another rig [px]; below
 # it a calibration is off.
-_FOREIGN_PX = 2.0
+_FOREIGN_PX = 1.5
 # Points of a pair that are held against the mesh.
 _LOOKED_AT = 2000
 # Points this many times the limit of the mean error from the mesh are stray; a pair
@@ -119,7 +119,7 @@ class _Judge:
 
     @cached_property
     def error_m(self) -> dict[PairIndex, Array]:
-        """Distances of some points of each pair from the mesh [m]."""
+        """How far some points of each pair are from the mesh, beyond noise [m]."""
         return {
             key: _distances(self.plan.mesh, cloud.thinned(_LOOKED_AT))
             for key, cloud in self.agreement.clouds.items()
@@ -167,7 +167,7 @@ class _Judge:
             other = max(against, key=lambda one: against[one])
             px, name = against[other], self.plan.name(other)
         else:
-            px = self._seen_px(self.agreement.clouds[key], key, self.believed)
+            px = self._seen_px(everywhere, key, self.believed)
             name = "other pairs"
         if px is None:
             return self._alone(key, everywhere)
@@ -221,10 +221,10 @@ class _Judge:
         return max(self._residuals(key, among).values(), default=-1.0)
 
     def _seen_px(
-        self, points: Cloud, of: PairIndex, others: Set[PairIndex]
+        self, some: Mask, of: PairIndex, others: Set[PairIndex]
     ) -> float | None:
         """Return the residual of points that others must have seen; None: too few."""
-        seen = self.agreement.evidence(points, of, others)
+        seen = self.agreement.evidence(some, of, others)
         return upper_px(seen) if len(seen) >= _FEWEST_SEEN else None
 
     def _alone(self, key: PairIndex, everywhere: Mask) -> _Verdict:
@@ -247,7 +247,7 @@ class _Judge:
         cloud = self.agreement.clouds[key]
         stray = _distances(self.plan.mesh, cloud) > stray_m
         others = {k for k in self.believed if self.on_mesh(k)}
-        seen_px = self._seen_px(cloud.take(stray), key, others)
+        seen_px = self._seen_px(stray, key, others)
         if seen_px is None:
             why, px = (
                 "doubtful: far off the mesh, and no other pair confirms them",
@@ -265,8 +265,10 @@ class _Judge:
 
 
 def _distances(mesh: TriangleMesh, cloud: Cloud) -> Array:
-    """From the mesh [m], shape (n,)."""
-    return np.abs(closest_points(mesh, cloud.points).distances)
+    """From the mesh [m], beyond what noise explains, shape (n,)."""
+    near = closest_points(mesh, cloud.points)
+    noise = cloud.per_pixel(mesh.face_normals[near.faces]) * cloud.noise_px
+    return np.maximum(np.abs(near.distances) - SIGMAS * noise, 0.0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -67,6 +67,18 @@ def pixel_sizes(cloud: Cloud, plan: Scanner) -> Array:
     return reach / focal[cloud.camera]
 
 
+def ring_pitch_px(cloud: Cloud, plan: Scanner) -> float:
+    """Median distance of neighbouring rings in images [px]."""
+    if len(cloud) == 0:
+        return 1.0
+    gaps = np.empty(len(cloud))
+    for p, projector in enumerate(plan.projectors):
+        chosen = cloud.projector == p
+        rings, depth = cloud.ring[chosen], projector.to_ring(cloud.points[chosen])[:, 2]
+        gaps[chosen] = projector.pattern.gaps_m(rings, depth)
+    return float(np.median(gaps / pixel_sizes(cloud, plan)))
+
+
 def _noise_px(cloud: Cloud, projector: int, camera: int) -> float | None:
     """Median noise of a pair's edges, doubt included; None: it measured nothing."""
     of_pair = (cloud.projector == projector) & (cloud.camera == camera)

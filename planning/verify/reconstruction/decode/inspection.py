@@ -14,6 +14,8 @@ from .edges import MIN_CONTRAST, read_code
 
 _LIT_BY_BITS = 20.0
 _FEWEST_LIT = 100
+# Beyond what so many deviations of a count explain.
+_DEVIATIONS = 4.0
 # From this level of 255 on, or where levels pile up, a sensor is taken to be clipped.
 _CLIPPED = 250.0
 _PILED = 50
@@ -99,17 +101,20 @@ def _lit_part(stack: Images) -> tuple[Images, tuple[int, int]]:
     contrast, lit = _contrast(stack), _lit(stack)
     n_lit = int(np.count_nonzero(contrast >= MIN_CONTRAST))
     n_below = int(np.count_nonzero(contrast <= -MIN_CONTRAST))
-    if n_below > max(n_lit, _FEWEST_LIT):
+    # Noise brightens about as many as it darkens.
+    surplus, chance = n_lit - n_below, _DEVIATIONS * np.sqrt(n_lit + n_below)
+    if -surplus > max(chance, _FEWEST_LIT):
         raise CapturesError(
             f"white is darker than black in {n_below} pixels, brighter in {n_lit}: "
             f"the two were exchanged, or are frames of something else"
         )
-    if n_lit < _FEWEST_LIT:
-        levels = [float(np.median(image)) for image in stack[:2]]
+    if surplus < max(chance, _FEWEST_LIT):
+        white, black = (float(np.median(image)) for image in stack[:2])
         raise DarkError(
             f"no light: white exceeds black by {MIN_CONTRAST:.0f} of 255 in {n_lit} "
-            f"pixels (median levels {levels[0]:.0f} and {levels[1]:.0f}); light the "
-            f"object, or expose longer; shorter if both are near 255"
+            f"pixels, black exceeds white in {n_below} (median levels {white:.0f} and "
+            f"{black:.0f}); light the object, or expose longer; shorter if both are "
+            f"near 255"
         )
     rows, columns = (np.flatnonzero(lit.any(axis=axis)) for axis in (1, 0))
     top, left = (max(0, int(place[0]) - _MARGIN_PX) for place in (rows, columns))
