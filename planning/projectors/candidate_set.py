@@ -43,14 +43,20 @@ class CandidateSource:
         return existing + candidates_with_clearance(self.scene, n, self._offer.over)
 
     def around(
-        self, chosen: Sequence[PlannedProjector], n_lattice: int, scale: float = 1.0
+        self,
+        chosen: Sequence[PlannedProjector],
+        n_lattice: int,
+        scale: float = 1.0,
+        *,
+        far: bool = False,
     ) -> tuple[PlannedProjector, ...]:
         """Return poses close around those chosen, existing ones excepted.
 
         `n_lattice` is the number of poses of the lattice that they are from; `scale`
-        says how far out, as a share of its spacing.
+        says how far out, as a share of its spacing; every other one is `far` from the
+        object if they may be.
         """
-        between = self._offer.around(movable(chosen), n_lattice, scale)
+        between = self._offer.around(movable(chosen), n_lattice, scale, far=far)
         return with_clearance(self.scene, between)
 
     def towards(self, directions: NDArray[np.float64]) -> tuple[PlannedProjector, ...]:

@@ -2,9 +2,9 @@
 
 A lattice of poses may need one projector more than free poses do, by a handful of
 samples. So where the best of one projector fewer fall short by little, poses close
-around them are offered too, and of all the ones that together light most are taken,
-again and again, from less and less far. Where that comes near, it begins anew from
-other poses, at last from a finer lattice.
+around them are offered too, some of them farther from the object, and of all the ones
+that together miss least are taken, again and again, from less and less far. Where that
+comes near, it begins anew from other poses, at last from a finer lattice.
 """
 
 from collections.abc import Callable
@@ -29,6 +29,9 @@ _NEAR = 0.015
 # With floors of regions a search goes on until so much of all is lit beyond what is
 # required, and a standard error beyond the floors: fresh samples should confirm it.
 _SPARE, _AIMED = 0.01, 1.0
+# Standard errors above the floors from which it begins: where floors are met and too
+# little of all is lit, poses in between win that; where a region is dark, they don't.
+_BEGUN = 0.0, 2.0
 # Searches that start apart, each of which may end in a place of its own; and how many
 # where one of them came so near.
 _STARTS, _MOST_STARTS = 2, 4
@@ -69,19 +72,20 @@ def one_fewer(
         best, short, found = _NONE, np.inf, None
         for attempt, scale in enumerate((*_SCALES, None)):
             seed = lattice.scene.seed + start * (len(_SCALES) + 1) + attempt
-            best, missing, required, spared = _most_lit(
-                poses, n_projectors, reached, best, seed
+            spares = _BEGUN if not attempt else (_AIMED * (short <= 0.0),)
+            best, missing, spared = _most_lit(
+                poses, n_projectors, reached, best, seed, spares
             )
             movable = best[best >= poses.n_existing]
-            found = poses.take(movable) if missing <= 0 else None
+            found = poses.take(movable) if missing <= 0.0 else None
             if found is not None and (spared or scale is None):
                 return found
             gain, short = short - missing, missing
-            nearest = min(nearest, missing / required)
-            hopeful = missing <= max(0, min(_SHORT * required, _GAINS * gain))
-            if scale is None or not (hopeful or missing <= near * required):
+            nearest = min(nearest, missing)
+            hopeful = missing <= max(0.0, min(_SHORT, _GAINS * gain))
+            if scale is None or not (hopeful or missing <= near):
                 break
-            between = source.around(poses.of(movable), n_lattice, scale)
+            between = source.around(poses.of(movable), n_lattice, scale, far=True)
             # They join the others: the best may be of both.
             poses, best = _without_idle(poses, best)
             poses = poses.extended(between)
@@ -119,23 +123,73 @@ def _most_lit(
     reached: NDArray[np.bool_],
     start: NDArray[np.int64],
     seed: int,
-) -> tuple[NDArray[np.int64], int, int, bool]:
-    """Return the poses that light most, what they miss, and what is required.
+    spares: tuple[float, ...],
+) -> tuple[NDArray[np.int64], float, bool]:
+    """Return the poses found that miss least, how much, and if fresh samples should.
 
-    Last whether fresh samples should confirm it.
+    Floors are looked for so many standard errors up, by one search each.
     """
     share = poses.scene.requirements.dominant_coverage
     regions = RegionFloors.of(poses.scene, poses.samples)
-    aims = Quotas.of(regions, reached, share, spare=_AIMED)
-    best = solve_max_coverage(
-        cover_problem(poses.lit, aims, poses.n_existing),
-        n_projectors,
-        warm_start=start,
-        seed=seed,
-        budget=_FLOORED_BUDGET if regions.share else _BUDGET,
-    ).selected
+    found = [start] if start.size else []
+    for spare in spares if regions.share else (0.0,):
+        sought = Quotas.of(regions, reached, share, spare=spare)
+        best = solve_max_coverage(
+            cover_problem(poses.lit, sought, poses.n_existing),
+            n_projectors,
+            warm_start=start,
+            seed=seed,
+            budget=_FLOORED_BUDGET if regions.share else _BUDGET,
+        ).selected
+        found.append(_swapped(poses, sought, best) if regions.share else best)
+
+    def missing(chosen: NDArray[np.int64]) -> tuple[float, int]:
+        lit = np.any(poses.lit[:, chosen], axis=1)
+        quotas = Quotas.of(regions, reached | lit, share)
+        counts = regions.counts(lit)
+        return float(_missed(quotas, counts[:, None])[0]), -int(counts.sum())
+
+    best = min(found, key=missing)
     lit = np.any(poses.lit[:, best], axis=1)
-    quotas = Quotas.of(regions, reached | lit, share)
-    spared = lit.sum() >= (1.0 + _SPARE) * quotas.total and aims.enough(lit)
-    spared = bool(spared) or not regions.share
-    return best, quotas.lacking(lit), quotas.total, spared
+    aims = Quotas.of(regions, reached | lit, share, spare=_AIMED)
+    spared = lit.sum() >= (1.0 + _SPARE) * aims.total and aims.enough(lit)
+    return best, missing(best)[0], bool(spared) or not regions.share
+
+
+def _missed(quotas: Quotas, counts: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the shares of quotas that are missed, added up, (k,).
+
+    Of counts of each number of `RegionFloors`, (n_rows, k). Poses that move by an angle
+    win in proportion to what there is, of a region as of all.
+    """
+    wanted = np.append(quotas.floors, quotas.total)[:, None]
+    short = wanted - np.vstack([counts, counts.sum(axis=0)])
+    return np.sum(np.clip(short, 0, None) / np.maximum(wanted, 1), axis=0)
+
+
+def _swapped(
+    poses: CandidateSet, quotas: Quotas, chosen: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Change a pose at a time, each time for what misses least, of these lights most.
+
+    What misses least needn't light most at any price of regions, and such are what
+    covers are looked for by.
+    """
+    numbers = np.arange(quotas.regions.n_rows)[:, None]
+    of_number = (quotas.regions.row == numbers).astype(np.float32)
+    best: tuple[float, int] = np.inf, 0
+    while True:
+        swaps: list[tuple[tuple[float, int], NDArray[np.int64]]] = [(best, chosen)]
+        for i in range(poses.n_existing, len(chosen)):
+            rest = np.delete(chosen, i)
+            lit = np.any(poses.lit[:, rest], axis=1)
+            counts = of_number[:, ~lit] @ poses.lit[~lit].astype(np.float32)
+            counts = counts.astype(np.int64) + quotas.regions.counts(lit)[:, None]
+            missed, total = _missed(quotas, counts), counts.sum(axis=0)
+            into = int(np.lexsort((-total, missed))[0])
+            swapped = np.unique(np.append(rest, into))
+            swaps.append(((float(missed[into]), -int(total[into])), swapped))
+        found, chosen = min(swaps, key=lambda pair: pair[0])
+        if found == best:
+            return chosen
+        best = found

@@ -1,16 +1,11 @@
 """Section III of the paper: the fewest projectors that light the dominant regions."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
-
-import numpy as np
-from numpy.typing import NDArray
 
 from planning.model.planned import PlannedProjector
-from planning.proofs.candidate_certificate import PlannedStage, certified
+from planning.proofs.candidate_certificate import PlannedStage, certified, unsought
 from planning.proofs.conflicts import Interference, resolve_conflicts
-from planning.proofs.selection import Selection, select_fewest
+from planning.proofs.selection import Selection
 from planning.scene.draws import DRAWS
 from planning.scene.lighting import lit_margins
 from planning.scene.limits import projector_limits
@@ -19,7 +14,7 @@ from planning.scene.scene import Scene
 from solvers import solve_cover
 
 from .candidate_set import CandidateSet, CandidateSource, NothingLitError
-from .one_fewer import one_fewer
+from .fewest_projectors import Found, Search, confirms
 from .share_margin import widest_selection
 
 _ROUNDS = 3
@@ -27,9 +22,6 @@ _ROUNDS = 3
 _FINER = 4
 # Counted work of the cover about which more candidates are offered.
 _SEEDS_BUDGET = 2e8
-# Counted work of the cover whose count is kept, where less left it unproved; the
-# latter with floors, of which more was seen to prove no more.
-_PROOF_BUDGET, _FLOORED_PROOF_BUDGET = 1e10, 3e9
 
 # Limits that are told of only where something could violate them.
 _BY_BLOCKERS = {
@@ -89,15 +81,16 @@ def plan_projectors(
 
     The best of a lattice of candidates get more candidates around them, and the cover
     is solved again over all. A minimal cover overfits its samples; so it is tested on
-    fresh ones, and where it falls short there, they join the samples and the cover is
-    solved once more.
+    fresh ones, and where it falls short there, some of them join the samples and the
+    cover is solved once more. Floors of regions are looked at last: the fewest that
+    light enough of all may meet them, and else are where the search goes on.
 
     Raises:
         NothingLitError: If no candidate lights any sample.
     """
-    source = CandidateSource(scene, template)
+    source, plain = CandidateSource(scene, template), scene.without_floors
     samples = scene.target_samples(DRAWS.projectors)
-    candidates = CandidateSet.over(scene, samples, source.lattice(n_candidates))
+    candidates = CandidateSet.over(plain, samples, source.lattice(n_candidates))
     if not candidates.lit.any():
         raise NothingLitError(candidates)
     n_lattice = len(candidates.projectors)
@@ -106,78 +99,16 @@ def plan_projectors(
     around = source.around(candidates.of(good.selected), n_lattice)
     candidates = candidates.extended(around)
 
-    def finer() -> CandidateSet:
-        poses = source.lattice(_FINER * n_candidates)
-        return CandidateSet.over(scene, candidates.samples, poses)
-
-    attempt, begun = 0, np.arange(n_lattice)
-    while True:
-        attempt += 1
-        candidates, selection = _fewest(
-            source, candidates, begun, finer, thorough=attempt == 1
-        )
-        fresh = candidates.on(
-            scene.target_samples(DRAWS.fresh_projectors.later(attempt))
-        )
-        confirmed = fresh.cover.confirms(selection.chosen)
-        if confirmed or selection.status == "infeasible" or attempt == rounds:
-            break
-        candidates = candidates.with_samples(fresh)
-        if scene.requirements.region_coverage:
-            # Floors leave little to spare: what nearly did is where to look on.
-            begun = np.union1d(begun, selection.chosen)
-    if confirmed and selection.status != "infeasible":
+    search = Search(source, n_lattice, _FINER * n_candidates, rounds)
+    found = search.fewest(Found(candidates, unsought(candidates.cover), 0, False))
+    if plain is not scene:
+        found = search.with_floors(found, scene)
+    candidates, selection = found.candidates, found.selection
+    if found.confirmed and selection.status != "infeasible":
         wider = _with_widest_margin(candidates, selection)
-        selection = wider if fresh.cover.confirms(wider.chosen) else selection
+        held = confirms(candidates, wider.chosen, found.draws)
+        selection = wider if held else selection
     return ProjectorStage.over(candidates, selection)
-
-
-def _fewest(
-    source: CandidateSource,
-    candidates: CandidateSet,
-    begun: NDArray[np.int64],
-    finer: Callable[[], CandidateSet],
-    *,
-    thorough: bool,
-) -> tuple[CandidateSet, Selection]:
-    """Return the fewest of the poses, with others as long as they save one.
-
-    One fewer is looked for from the poses `begun`. Near misses are pursued on the first
-    samples only: where fresh ones have joined them, a cover so tight has failed
-    already.
-    """
-    selection = select_fewest(candidates.cover)
-    lattice, finer_once = candidates.take(begun), cache(finer)
-    while selection.needed > candidates.n_existing + 1:
-        moved = one_fewer(
-            source,
-            lattice,
-            selection.needed - 1,
-            finer=finer_once,
-            reached=candidates.reached,
-            thorough=thorough,
-        )
-        if moved is None:
-            break
-        first = len(candidates.projectors)
-        candidates = candidates.joined(moved)
-        known = [
-            *range(candidates.n_existing),
-            *range(first, len(candidates.projectors)),
-        ]
-        again = select_fewest(candidates.cover, known=np.array(known, np.int64))
-        if again.needed >= selection.needed:
-            break
-        selection = again
-    if selection.lower_bound < selection.needed:
-        # Only a count that is kept is worth a longer proof.
-        floored = selection.floors is not None
-        selection = select_fewest(
-            candidates.cover,
-            known=selection.smallest,
-            budget=_FLOORED_PROOF_BUDGET if floored else _PROOF_BUDGET,
-        )
-    return candidates, selection
 
 
 def _with_widest_margin(candidates: CandidateSet, selection: Selection) -> Selection:

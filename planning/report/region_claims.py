@@ -60,8 +60,9 @@ class RegionSamples:
     def of(cls, scene: Scene, devices: Devices, judged: Judged) -> "RegionSamples":
         """Return judged samples of the target, and what large regions lack."""
         parts = [judged]
-        if (lacking := _lacking(scene, judged.target)) is not None:
-            parts.append(Judged.of(scene, devices, lacking))
+        more = scene.more_of_regions(judged.target, DRAWS.region_claims)
+        if more is not None:
+            parts.append(Judged.of(scene, devices, more))
         target = (
             parts[0].target if len(parts) == 1 else merged(*(p.target for p in parts))
         )
@@ -155,16 +156,3 @@ def below_floor(areas: RegionCoverage, share: float) -> tuple[bool, bool]:
     lit = share * areas.reachable_by_projectors_m2 * (1.0 - _SLACK)
     measured = share * areas.reachable_by_cameras_m2 * (1.0 - _SLACK)
     return areas.lit_m2 < lit, areas.measured_m2 < measured
-
-
-def _lacking(scene: Scene, target: Target) -> Target | None:
-    """Draw the samples that large regions lack; None: they have enough."""
-    draw = DRAWS.region_claims
-    region = scene.region[target.samples.faces]
-    every: Target | None = None
-    for index in scene.large_regions.tolist():
-        lack = draw.count - int((region == index).sum())
-        if lack > 0:
-            more = scene.region_samples(draw.of(lack), index)
-            every = more if every is None else merged(every, more)
-    return every

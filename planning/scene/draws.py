@@ -27,8 +27,9 @@ class Draw:
 class Draws:
     """Every draw of a plan, and how many of drawn samples slower steps look at.
 
-    Fresh samples confirm a cover, a stream further on each round; rounds of ring
-    spacing go two streams further. Areas of the plan are computed from `claims`, those
+    Fresh samples confirm a cover, a stream further on each round, and a region by at
+    least as many as `fresh_regions`; rounds of ring spacing go two streams further.
+    Areas of the plan are computed from `claims`, those
     of a region from at least as many as `region_claims`. Mere
     numbers are samples at most: `dark` where nothing at all is lit, `fewer_devices` for
     what would let fewer be enough.
@@ -36,7 +37,8 @@ class Draws:
 
     site: Draw = Draw(2000, 50)
     projectors: Draw = Draw(2000, 100)
-    fresh_projectors: Draw = Draw(4000, 100)
+    fresh_projectors: Draw = Draw(12_000, 100)
+    fresh_regions: Draw = Draw(400, 910)
     cameras: Draw = Draw(2000, 200)
     fresh_cameras: Draw = Draw(4000, 200)
     axes: Draw = Draw(4000, 250)

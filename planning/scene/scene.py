@@ -25,7 +25,7 @@ from .placed_bodies import (
     bodies_of,
     existing_bodies,
 )
-from .samples import Target
+from .samples import Target, merged
 
 Kind = Literal["projector", "camera"]
 
@@ -75,7 +75,14 @@ class Scene:
             rest = tuple(other for other in self.obstructions if other is not moved)
             yield moved.words, self._with(obstructions=rest)
 
-    def _with(self, **changes: tuple[object, ...]) -> "Scene":
+    @property
+    def without_floors(self) -> "Scene":
+        """The scene of which no region has a floor."""
+        if not self.requirements.region_coverage:
+            return self
+        return self._with(requirements=replace(self.requirements, region_coverage=0.0))
+
+    def _with(self, **changes: object) -> "Scene":
         other = replace(self, **changes)
         # What rays are cast against is the same mesh.
         other.__dict__["visibility"] = self.visibility
@@ -118,6 +125,17 @@ class Scene:
     def region_samples(self, draw: Draw, region: int) -> Target:
         """Return area-true samples of a region, by a stream of its own."""
         return self._samples(draw, self.region == region, region + 1)
+
+    def more_of_regions(self, target: Target, draw: Draw) -> Target | None:
+        """Draw what large regions lack of so many samples; None: they have enough."""
+        region = self.region[target.samples.faces]
+        every: Target | None = None
+        for index in self.large_regions.tolist():
+            lack = draw.count - int((region == index).sum())
+            if lack > 0:
+                more = self.region_samples(draw.of(lack), index)
+                every = more if every is None else merged(every, more)
+        return every
 
     def target_samples(self, draw: Draw) -> Target:
         """Return area-true samples of the target."""

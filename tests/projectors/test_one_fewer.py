@@ -5,7 +5,7 @@ Parallel light within 45 degrees lights caps of (1 - cos 45)/2 = 0.146 of a ball
 takes six, and only if they stand just there: a coarse lattice needs seven.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from support.factories import make_projector, make_requirements, make_scene
 
 from geometry.shapes.primitives import sphere
 from planning.projectors.candidate_set import CandidateSet, CandidateSource
-from planning.projectors.one_fewer import one_fewer
+from planning.projectors.one_fewer import _missed, _swapped, one_fewer
 from planning.projectors.share_margin import margin_at_share, widest_between
 from planning.proofs.quotas import Quotas, RegionFloors
 from planning.proofs.selection import select_fewest
@@ -83,6 +83,7 @@ def test_a_finer_lattice_is_asked_for_where_it_comes_near(
 ):
     # So coarse a lattice begins farther off than those that are planned with.
     monkeypatch.setattr("planning.projectors.one_fewer._SHORT", 0.1)
+    monkeypatch.setattr("planning.projectors.one_fewer._SCALES", (1.0, 0.5))
     source, offer = lattice
     # Six caps light 0.879 of the ball, about 1,800 of these; five light far less.
     share = 1815 / int(offer.reached.sum())
@@ -107,6 +108,43 @@ def test_what_any_known_pose_reaches_is_asked_for(lattice):
     for reached, enough in ((one.reached, True), (np.ones_like(one.reached), False)):
         found = one_fewer(source, one, 1, finer=lambda: one, reached=reached)
         assert (found is not None) is enough
+
+
+@dataclass
+class Poses:
+    """What random poses light of random samples; the first one stands already."""
+
+    lit: np.ndarray
+    n_existing: int = 1
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_other_pose_in_the_place_of_one_misses_less_of_floors_and_all(seed):
+    rng = np.random.default_rng(seed)
+    poses = Poses(rng.random((80, 30)) < 0.35)
+    regions = RegionFloors(rng.integers(0, 4, 80), 4, 0.8)
+    quotas = Quotas.of(regions, np.ones(80, dtype=bool), 0.9)
+
+    def missed(chosen):
+        lit = poses.lit[:, chosen].any(axis=1)
+        short = [max(0, quotas.total - lit.sum()) / quotas.total]
+        for number in (1, 2, 3):
+            wanted = np.ceil(0.8 * (regions.row == number).sum())
+            short.append(max(0, wanted - lit[regions.row == number].sum()) / wanted)
+        assert sum(short) == pytest.approx(
+            float(_missed(quotas, regions.counts(lit)[:, None])[0])
+        )
+        return sum(short), -lit.sum()
+
+    start = np.array([0, 7, 11, 13])
+    found = _swapped(poses, quotas, start)
+    assert found[0] == 0
+    assert len(found) == 4
+    assert missed(found) < missed(start)
+    others = [
+        np.append(np.delete(found, i), other) for i in (1, 2, 3) for other in range(30)
+    ]
+    assert missed(found)[0] <= min(missed(other)[0] for other in others) + 1e-12
 
 
 def test_margins_grow_between_the_poses_of_a_lattice(lattice):

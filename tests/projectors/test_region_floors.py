@@ -12,6 +12,7 @@ from support.factories import make_projector, make_requirements, make_scene
 from support.fewer_samples import draw_fewer
 from support.plain_shapes import box
 
+from planning.projectors.fewest_projectors import confirms
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import plan_projectors
 from planning.projectors.proved_projectors import prove_fewest
@@ -71,6 +72,29 @@ def test_a_floor_lights_a_small_region_with_as_many_projectors():
     for found in (without, stage):
         assert found.certificate.status == "optimal"
         assert found.certificate.count == found.certificate.needed.lower_bound == 2
+
+
+def test_floors_that_the_fewest_happen_to_meet_change_nothing():
+    asked = {"max_projectors": 5, "dominant_coverage": 0.8}
+    _, without, free = planned(BIG, 0.0, **asked)
+    _, stage, projectors = planned(BIG, 0.5, **asked)
+    assert stage.certificate.count == without.certificate.count == 2
+    for one, other in zip(free, projectors, strict=True):
+        assert np.allclose(one.world_from_device, other.world_from_device)
+
+
+def test_fresh_samples_confirm_the_total_and_every_floor():
+    sides = (*BIG, (0, 0, 1))
+    asked = {"max_projectors": 5, "dominant_coverage": 0.8}
+    # Frontal light leaves the small side dark: enough of all, but a floor is missed.
+    scene, stage, frontal = planned(sides, 0.0, **asked)
+    candidates = stage.candidates.extended(frontal)
+    chosen = np.arange(2) + len(stage.candidates.projectors)
+    required = replace(scene.requirements, region_coverage=0.5)
+    floored = replace(candidates, scene=replace(scene, requirements=required))
+    assert confirms(candidates, chosen, 5)
+    assert not confirms(floored, chosen, 5)
+    assert not confirms(candidates, chosen[:1], 5)
 
 
 def test_a_floor_costs_a_projector_and_both_bounds_say_so():

@@ -188,12 +188,19 @@ def _offer(space):
 def test_candidates_around_a_chosen_one_fill_the_gap_of_the_lattice():
     space = workspace()
     chosen = _offer(space).over(640)[200]
-    found = _offer(space).around([chosen], 640)
+    found = _offer(space).around([chosen], 640, far=True)
     before, *after = (p.world_from_device[:3, 3] - CENTRE for p in (chosen, *found))
+    # In the middle of the shell and at its far end by turns, each over the whole cap.
+    radii = np.linalg.norm(after, axis=1)
+    far = space.projector_radius_m[1]
+    assert np.sum(np.abs(radii - 1.2) < 1e-9) == len(after) / 2
+    assert np.sum((radii > far - 2e-4) & (radii < far)) == len(after) / 2
+    after = 1.2 * np.array(after) / radii[:, None]
     angles = np.arccos(np.clip(np.array(after) @ before / 1.2**2, -1, 1))
     # 640 on a sphere: 4 pi / 640 sr each.
     assert np.degrees(angles.max()) == pytest.approx(8.0, abs=0.3)
-    assert np.allclose(np.linalg.norm(after, axis=1), 1.2)
+    for half in (radii < 1.2 + 1e-9, radii > 1.2 + 1e-9):
+        assert np.degrees(angles[half].max()) > 7.5
     probes = np.random.default_rng(1).normal(size=(20_000, 3))
     probes /= np.linalg.norm(probes, axis=1, keepdims=True)
     probes = probes[probes @ before > 1.2 * np.cos(np.radians(7.5))]

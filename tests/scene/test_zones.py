@@ -197,7 +197,7 @@ def test_candidates_fill_what_is_left(workspace_of, name):
 def test_rays_find_the_admissible_radius_nearest_to_the_middle(workspace_of, name):
     space = workspace_of(ZONES[name])
     rays = fibonacci_cap(400, np.array([0.0, 0, 1]), np.pi)
-    found = along_rays(space, (1.05, 1.15), rays)
+    found = along_rays(space, (1.05, 1.15), rays, 1.1)
     radii = np.linalg.norm(found, axis=1)
     steps = np.linspace(1.05, 1.15, 2001)
     n_with, at = 0, 0

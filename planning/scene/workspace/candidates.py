@@ -34,6 +34,8 @@ _AROUND = 60
 _BESIDE = 3
 _LEAST_DIRECTIONS = 24
 _PROBED = 48
+# Off the far end of the shell, so that rounding a pose keeps it inside.
+_NUDGE_M = 1e-4
 # Sine of the angle to the vertical below which a direction has no level across it.
 _LEVEL = 1e-6
 
@@ -102,14 +104,21 @@ class Candidates(Generic[_D]):
         return self._at(poses)
 
     def around(
-        self, chosen: Sequence[_D], n_lattice: int, scale: float = 1.0
+        self,
+        chosen: Sequence[_D],
+        n_lattice: int,
+        scale: float = 1.0,
+        *,
+        far: bool = False,
     ) -> tuple[_D, ...]:
         """Return candidates between those of a lattice, close around chosen ones.
 
         Each chosen pose gets positions out to the lattice's spacing, as seen from the
         centre of the workspace (times `scale`), as far as they are admissible; laid out
-        from the vertical through it, so that they turn with the workspace. In tiled
-        placement, they are turned about what they look at and moved along with it.
+        from the vertical through it, so that they turn with the workspace. If they may
+        be `far`, every other one is at the far end of the shell, where more of the
+        object is seen. In tiled placement, they are turned about what they look at and
+        moved along with it.
         """
         if not chosen:
             return ()
@@ -119,13 +128,17 @@ class Candidates(Generic[_D]):
             return self._at(poses_beside(self.site, poses, _AROUND, reach=reach))
         reach = scale * self._spacing(n_lattice // len(self.rolls))
         positions: list[_Array] = []
+        furthest = max(0.5 * sum(self._shell), self._shell[1] - _NUDGE_M)
         for pose in poses:
             outwards = pose[:3, 3] - np.array(self.workspace.centre)
             outwards = outwards / np.linalg.norm(outwards)
             level = np.cross(np.array(self.workspace.up), outwards)
             start = level if np.linalg.norm(level) > _LEVEL else None
             cap = fibonacci_cap(_AROUND, outwards, reach, start=start)
-            positions.append(self._positions(cap))
+            near = slice(None, None, 2 if far else 1)
+            positions.append(self._positions(cap[near]))
+            if far:
+                positions.append(self._positions(cap[1::2], furthest))
         return self._at(self._aimed(np.concatenate(positions)))
 
     @property
@@ -163,8 +176,8 @@ class Candidates(Generic[_D]):
         low, high = self._radius_m
         return (low if self.site is None else 2.0 * self.middle_radius_m - high), high
 
-    def _positions(self, directions: _Array) -> _Array:
-        offsets = towards(self.workspace, self._shell, directions)
+    def _positions(self, directions: _Array, wanted_m: float | None = None) -> _Array:
+        offsets = towards(self.workspace, self._shell, directions, wanted_m)
         return np.array(self.workspace.centre) + offsets
 
     def _aimed(self, positions: _Array) -> _Array:

@@ -1,8 +1,8 @@
 """Positions spread over the workspace: along rays from its centre, or on planes.
 
 Along a ray x = r u every limit holds on intervals of r, so the admissible radius
-nearest to the middle of the shell is the middle itself or an end of an interval. Only
-those are tried.
+nearest to one that is wanted is that one itself or an end of an interval. Only those
+are tried.
 """
 
 import numpy as np
@@ -51,22 +51,32 @@ def shell_positions(workspace: Workspace, radius_m: Range, n: int) -> _Array:
         offered = int(min(wanted, _MOST_OFFERED * n))
 
 
-def towards(workspace: Workspace, radius_m: Range, directions: _Array) -> _Array:
-    """Return admissible offsets from the centre in directions (n, 3), shape (m, 3)."""
+def towards(
+    workspace: Workspace,
+    radius_m: Range,
+    directions: _Array,
+    wanted_m: float | None = None,
+) -> _Array:
+    """Return admissible offsets from the centre in directions (n, 3), shape (m, 3).
+
+    At the radius wanted, by default the shell's middle, or as near as zones allow.
+    """
+    radius = 0.5 * sum(radius_m) if wanted_m is None else wanted_m
     if is_zoned(workspace):
-        return along_rays(workspace, radius_m, directions)
-    radius = 0.5 * (radius_m[0] + radius_m[1])
+        return along_rays(workspace, radius_m, directions, radius)
     offsets = radius * directions
     return offsets[admissible(workspace, (radius, radius), offsets)]
 
 
-def along_rays(workspace: Workspace, radius_m: Range, directions: _Array) -> _Array:
-    """Return a position on each ray that has one, nearest to the middle of the shell.
+def along_rays(
+    workspace: Workspace, radius_m: Range, directions: _Array, wanted_m: float
+) -> _Array:
+    """Return a position on each ray that has one, nearest to the radius wanted.
 
     Of unit directions (n, 3): offsets from the centre, in their order, shape (m, 3).
     """
     parts = [
-        _on_rays(workspace, radius_m, directions[start : start + _BATCH])
+        _on_rays(workspace, radius_m, directions[start : start + _BATCH], wanted_m)
         for start in range(0, len(directions), _BATCH)
     ]
     return np.concatenate([np.empty((0, 3)), *parts])
@@ -84,20 +94,24 @@ def _laid(planes: tuple[Box, ...], n: int) -> list[_Array]:
     return places
 
 
-def _on_rays(workspace: Workspace, radius_m: Range, directions: _Array) -> _Array:
-    radii = _trials(workspace, radius_m, directions)
+def _on_rays(
+    workspace: Workspace, radius_m: Range, directions: _Array, wanted_m: float
+) -> _Array:
+    radii = _trials(workspace, radius_m, directions, wanted_m)
     trials = radii[..., None] * directions[:, None]
     good = admissible(workspace, radius_m, trials.reshape(-1, 3)).reshape(radii.shape)
-    off = np.where(good, np.abs(radii - 0.5 * (radius_m[0] + radius_m[1])), np.inf)
+    off = np.where(good, np.abs(radii - wanted_m), np.inf)
     best = np.argmin(off, axis=1)
     return trials[np.arange(len(best)), best][good.any(axis=1)]
 
 
-def _trials(workspace: Workspace, radius_m: Range, directions: _Array) -> _Array:
+def _trials(
+    workspace: Workspace, radius_m: Range, directions: _Array, wanted_m: float
+) -> _Array:
     """Radii at which a limit begins or ends to hold on each ray, shape (n, k)."""
     low, high = radius_m
     n = len(directions)
-    ends = [np.full(n, r) for r in (0.5 * (low + high), low, high)]
+    ends = [np.full(n, r) for r in (wanted_m, low, high)]
     if workspace.floor_m is not None:
         rise = directions @ np.array(workspace.up)
         level = workspace.floor_m / _off_zero(rise)
@@ -107,9 +121,9 @@ def _trials(workspace: Workspace, radius_m: Range, directions: _Array) -> _Array
         enter, leave = _interval(box, directions)
         ends += [enter - _NUDGE_M, enter + _NUDGE_M, leave - _NUDGE_M]
         ends += [leave + _NUDGE_M, 0.5 * (enter + leave)]
-    # A ray that misses a box has an end nowhere: the middle again.
+    # A ray that misses a box has an end nowhere: the one wanted again.
     radii = np.column_stack(ends)
-    return np.where((radii >= low) & (radii <= high), radii, 0.5 * (low + high))
+    return np.where((radii >= low) & (radii <= high), radii, wanted_m)
 
 
 def _interval(box: Box, directions: _Array) -> tuple[_Array, _Array]:

@@ -1,0 +1,156 @@
+"""The search for the fewest projectors, until samples that are fresh confirm them."""
+
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.proofs.quotas import Quotas, RegionFloors
+from planning.proofs.selection import Selection, select_fewest
+from planning.scene.draws import DRAWS
+from planning.scene.samples import merged
+from planning.scene.scene import Scene
+
+from .candidate_set import CandidateSet, CandidateSource
+from .one_fewer import one_fewer
+
+# Of fresh samples that don't confirm a cover one in so many joins those of the next.
+_JOINING = 3
+# Standard errors above their floors at which fresh samples confirm regions.
+_AIMED = 1.0
+# Counted work of the cover whose count is kept, where less left it unproved; the
+# latter with floors, of which more was seen to prove no more.
+_PROOF_BUDGET, _FLOORED_PROOF_BUDGET = 1e10, 3e9
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """The fewest of candidates, after how many draws, and whether the last agrees."""
+
+    candidates: CandidateSet
+    selection: Selection
+    draws: int
+    confirmed: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """Looks for the fewest candidates, and for poses between them that save one.
+
+    Attributes:
+        source: Gives other poses.
+        n_lattice: First candidates, which are spread over the workspace.
+        n_finer: Poses of a finer lattice.
+        rounds: Times that samples are fresh, at most.
+    """
+
+    source: CandidateSource
+    n_lattice: int
+    n_finer: int
+    rounds: int
+
+    def fewest(self, before: Found) -> Found:
+        """Return the fewest; no fewer than before are looked for between candidates."""
+        candidates, draw = before.candidates, before.draws
+        begun = np.union1d(np.arange(self.n_lattice), before.selection.chosen)
+        while True:
+            draw += 1
+            first, last = (draw == before.draws + k for k in (1, self.rounds))
+            candidates, selection = self._between(
+                candidates, begun, before.selection.needed, thorough=first
+            )
+            confirmed = confirms(candidates, selection.chosen, draw)
+            if confirmed or selection.status == "infeasible" or last:
+                return Found(candidates, selection, draw, confirmed)
+            fresh = candidates.scene.target_samples(DRAWS.fresh_projectors.later(draw))
+            some = fresh.take(np.arange(0, len(fresh), _JOINING))
+            candidates = candidates.with_samples(candidates.on(some))
+            if candidates.scene.requirements.region_coverage:
+                # Floors leave little to spare: what nearly did is where to look on.
+                begun = np.union1d(begun, selection.chosen)
+
+    def with_floors(self, found: Found, scene: Scene) -> Found:
+        """Return the fewest that meet a scene's floors; those found, if they do."""
+        candidates, chosen = replace(found.candidates, scene=scene), found.selection
+        floored, quotas = replace(found, candidates=candidates), candidates.cover.quotas
+        if not quotas.floors.any():
+            return floored
+        met = found.confirmed and candidates.cover.enough(chosen.chosen)
+        if met and confirms(candidates, chosen.chosen, found.draws):
+            return replace(floored, selection=replace(chosen, floors=quotas))
+        return self.fewest(floored)
+
+    def _between(
+        self,
+        candidates: CandidateSet,
+        begun: NDArray[np.int64],
+        least: int,
+        *,
+        thorough: bool,
+    ) -> tuple[CandidateSet, Selection]:
+        """Return the fewest of the poses, with others as long as they save one.
+
+        One fewer, but no fewer than `least`, is looked for from the poses `begun`. Near
+        misses of a share of all are pursued on the first samples only: where fresh ones
+        have joined them, a cover so tight has failed already.
+        """
+        scene, samples = candidates.scene, candidates.samples
+        selection = select_fewest(candidates.cover)
+        lattice = candidates.take(begun)
+
+        @cache
+        def finer() -> CandidateSet:
+            return CandidateSet.over(scene, samples, self.source.lattice(self.n_finer))
+
+        while selection.needed > max(candidates.n_existing + 1, least):
+            moved = one_fewer(
+                self.source,
+                lattice,
+                selection.needed - 1,
+                finer=finer,
+                reached=candidates.reached,
+                thorough=thorough or selection.floors is not None,
+            )
+            if moved is None:
+                break
+            first = len(candidates.projectors)
+            candidates = candidates.joined(moved)
+            known = [
+                *range(candidates.n_existing),
+                *range(first, len(candidates.projectors)),
+            ]
+            again = select_fewest(candidates.cover, known=np.array(known, np.int64))
+            if again.needed >= selection.needed:
+                break
+            selection = again
+        if selection.lower_bound < selection.needed:
+            # Only a count that is kept is worth a longer proof.
+            floored = selection.floors is not None
+            selection = select_fewest(
+                candidates.cover,
+                known=selection.smallest,
+                budget=_FLOORED_PROOF_BUDGET if floored else _PROOF_BUDGET,
+            )
+        return candidates, selection
+
+
+def confirms(candidates: CandidateSet, chosen: NDArray[np.int64], draw: int) -> bool:
+    """Return whether those chosen light enough of samples that are fresh.
+
+    Of all by a draw of the target; of regions by that and more samples of them.
+    """
+    scene = candidates.scene
+    samples = scene.target_samples(DRAWS.fresh_projectors.later(draw))
+    n = len(samples)
+    more = scene.more_of_regions(samples, DRAWS.fresh_regions.later(draw))
+    if scene.requirements.region_coverage and more is not None:
+        samples = merged(samples, more)
+    lit = CandidateSet.over(scene, samples, candidates.of(chosen)).reached
+    reached, dark = lit.copy(), samples.take(~lit)
+    reached[~lit] = CandidateSet.over(scene, dark, candidates.projectors).reached
+    share = scene.requirements.dominant_coverage
+    if lit[:n].sum() < share * reached[:n].sum():
+        return False
+    floors = RegionFloors.of(scene, samples)
+    return Quotas.of(floors, reached, 0.0, spare=_AIMED).enough(lit)
