@@ -26,8 +26,8 @@ class BaselineProgram:
     """The stated program: minimise f, low <= g <= high.
 
     Attributes:
-        x: Variables O_1, ..., O_k, t, and of an elastic program the aims and what each
-            limit gives way by, (n, 1).
+        x: Variables O_1, ..., O_k, t, and of an elastic program the aims, the rolls,
+            what each limit gives way by, and what camera 1 gains at each E, (n, 1).
         objective: f.
         constraints: g.
         low: Lower bounds of g.
@@ -45,15 +45,13 @@ class BaselineProgram:
 
 def build_baseline_program(problem: BaselineProblem) -> BaselineProgram:
     """State the program."""
-    k, n_seams = len(problem.centres), len(problem.seams.points)
-    begin, aims = problem.centres.ravel(), ca.SX(problem.aims)
-    n_limits = n_seams + len(problem.kept.camera)
-    x, free, slack = ca.SX.sym("x", 3 * k + 1), ca.SX(0, 1), ca.SX.zeros(n_limits)
-    t = x[3 * k]
+    k, begin = len(problem.centres), problem.centres.ravel()
+    x, looks = ca.SX.sym("x", 3 * k + 1), np.append(problem.aims, problem.rolls)
+    t, free, gives = x[3 * k], ca.SX(looks), _Slacks(problem)
     if problem.elastic:
-        free, slack = ca.SX.sym("aims", 3 * k), ca.SX.sym("slack", n_limits)
-        aims = ca.reshape(free, 3, k).T
-    cameras = _Cameras(problem, ca.reshape(x[: 3 * k], 3, k).T, aims)
+        free = ca.SX.sym("looks", 4 * k)
+    aims, rolls = ca.reshape(free[: 3 * k], 3, k).T, free[3 * k :]
+    cameras = _Cameras(problem, ca.reshape(x[: 3 * k], 3, k).T, aims, rolls)
     stated, covering = _Stated(), _Stated()
     apart = _norm(
         _rows(cameras.centres, problem.pairs[:, 0])
@@ -62,18 +60,20 @@ def build_baseline_program(problem: BaselineProblem) -> BaselineProgram:
     if not problem.elastic:
         stated.add(apart - t)
     _state_workspace(stated, problem, cameras.centres)
-    if n_seams:
-        _state_seams(covering, problem, cameras, slack[:n_seams])
+    if len(problem.seams.points):
+        _state_seams(covering, problem, cameras)
     if len(problem.kept.camera):
-        _state_kept(covering, problem, cameras, slack[n_seams:])
-    every = ca.vertcat(x, free, slack) if problem.elastic else x
+        _state_kept(covering, problem, cameras, gives.lifts)
+    every = ca.vertcat(x, free, gives.slack, gives.gain) if problem.elastic else x
     start = np.append(begin, problem.smallest_baseline)
     if problem.weights is not None:
-        start = np.concatenate([start, problem.aims.ravel(), np.full(n_limits, _SLACK)])
+        first = np.full(len(problem.weights), _SLACK), np.zeros(len(problem.reserves))
+        start = np.concatenate([start, looks, *first])
         start[3 * k] = 0.0
-        moved = ca.vertcat(x[: 3 * k] - begin, free - problem.aims.ravel())
-        objective = ca.dot(ca.DM(problem.weights), slack)
-        objective += _NEAR * ca.sumsqr(moved) / problem.max_step**2
+        moved = ca.vertcat(x[: 3 * k] - begin, free[: 3 * k] - looks[: 3 * k])
+        objective = ca.dot(ca.DM(problem.weights), gives.slack)
+        turned = ca.sumsqr(rolls - problem.rolls)
+        objective += _NEAR * (ca.sumsqr(moved) / problem.max_step**2 + turned)
     else:
         covering.admit(every, start)
         objective = -t - _MEAN_WEIGHT * ca.sum1(apart) / len(problem.pairs)
@@ -109,12 +109,45 @@ class _Stated:
 
 
 @dataclass(frozen=True, eq=False)
+class _Slacks:
+    """What limits give way by; at an end of a part what camera 1 gains there, too."""
+
+    problem: BaselineProblem
+
+    @cached_property
+    def alone(self) -> ca.SX:
+        n_ends = len(self.problem.reserves)
+        return ca.SX.sym("alone", len(self.problem.kept.camera) - 2 * n_ends)
+
+    @cached_property
+    def ended(self) -> ca.SX:
+        return ca.SX.sym("ended", len(self.problem.reserves))
+
+    @cached_property
+    def gain(self) -> ca.SX:
+        return ca.SX.sym("gain", len(self.problem.reserves))
+
+    @property
+    def slack(self) -> ca.SX:
+        return ca.vertcat(self.alone, self.ended)
+
+    @property
+    def lifts(self) -> ca.SX:
+        """What is added to the margins of kept points."""
+        if not self.problem.elastic:
+            return ca.SX.zeros(len(self.problem.kept.camera))
+        first = -self.gain - ca.DM(self.problem.reserves)
+        return ca.vertcat(self.alone, first, self.gain + self.ended)
+
+
+@dataclass(frozen=True, eq=False)
 class _Cameras:
-    """Cameras by their centres and aims, (k, 3) each."""
+    """Cameras by their centres and aims, (k, 3) each, and rolls, (k, 1)."""
 
     problem: BaselineProblem
     centres: _Matrix
     aims: _Matrix
+    rolls: _Matrix
 
     @cached_property
     def axes(self) -> _Matrix:
@@ -123,10 +156,12 @@ class _Cameras:
     @cached_property
     def sides(self) -> tuple[_Matrix, _Matrix]:
         """The image's own x and y, each (k, 3): `look_at`, turned by the roll."""
-        z, up = self.axes, self.problem.shell.up
-        level = _unit(_cross(z, ca.repmat(ca.DM(up).T, z.shape[0], 1)))
-        down, roll = _cross(z, level), ca.DM(self.problem.rolls)
-        c, s = (ca.repmat(f(roll), 1, 3) for f in (ca.cos, ca.sin))
+        z, ups = self.axes, self.problem.ups
+        if ups is None:
+            ups = np.tile(self.problem.shell.up, (z.shape[0], 1))
+        level = _unit(_cross(z, ca.DM(ups)))
+        down = _cross(z, level)
+        c, s = (ca.repmat(f(self.rolls), 1, 3) for f in (ca.cos, ca.sin))
         return c * level + s * down, c * down - s * level
 
 
@@ -158,9 +193,7 @@ def _state_workspace(
     )
 
 
-def _state_seams(
-    stated: _Stated, problem: BaselineProblem, cameras: _Cameras, slack: ca.SX
-) -> None:
+def _state_seams(stated: _Stated, problem: BaselineProblem, cameras: _Cameras) -> None:
     """Camera 2 has left at E what camera 1 gives up there, and vice versa."""
     left1, left2 = _seam_margins(problem, cameras.centres, cameras.axes)
     now1, _ = _seam_margins(
@@ -169,7 +202,7 @@ def _state_seams(
     reserve = ca.fmin(*now1)
     for first in left1:
         for second in left2:
-            stated.add(first - reserve + second + slack)
+            stated.add(first - reserve + second)
 
 
 def _seam_margins(
@@ -194,17 +227,17 @@ def _seam_margins(
 
 
 def _state_kept(
-    stated: _Stated, problem: BaselineProblem, cameras: _Cameras, slack: ca.SX
+    stated: _Stated, problem: BaselineProblem, cameras: _Cameras, lifts: ca.SX
 ) -> None:
     kept = problem.kept
     ray = ca.DM(kept.points) - _rows(cameras.centres, kept.camera)
     distance = _norm(ray)
     for margin in _view_margins(problem, cameras, ray, distance):
-        stated.add(margin + slack)
+        stated.add(margin + lifts)
     ringed = np.flatnonzero(np.any(kept.ring_normals != 0.0, axis=1))
     if len(ringed):
         for margin in _ring_margins(problem, _rows(ray, ringed), ringed):
-            stated.add(margin + slack[ringed.tolist()])
+            stated.add(margin + lifts[ringed.tolist()])
 
 
 def _view_margins(

@@ -99,6 +99,7 @@ class BaselineProblem:
         seams: Where parts meet.
         kept: What each camera must keep.
         rolls: Turns of the cameras about their axes against `look_at` [rad], (k,).
+        ups: Up of each camera in that, shape (k, 3); None: that of the shell.
         sides: Least and largest x/z and y/z in the image, shape (2, 2).
         max_incidence: theta in [rad].
         range_m: Least and largest |O - P| of kept points in [m].
@@ -107,7 +108,11 @@ class BaselineProblem:
         half_spaces: What else holds the centres.
         fixed: Cameras that stay where they are, wherever that is, shape (f,).
         weights: None: baselines are maximised and no limit gives way. Else what a limit
-            that gives way costs, at seams and then at kept points, shape (s + m,).
+            that gives way costs: at each kept point but the last 2 e, then at each of e
+            ends of parts, shape (m - e,).
+        reserves: What the tightest limit of camera 1 leaves at the start where its part
+            ends at E, shape (e,). The last 2 e kept points are first these E for camera
+            1, then what lies beyond each for camera 2.
     """
 
     centres: _Array
@@ -129,6 +134,8 @@ class BaselineProblem:
     )
     fixed: tuple[int, ...] = ()
     weights: _Array | None = None
+    ups: _Array | None = None
+    reserves: _Array = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         k = len(self.centres)

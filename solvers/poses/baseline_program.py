@@ -43,11 +43,12 @@ from solvers.status import SolveStatus
 
 from .baseline_nlp import BaselineProgram, build_baseline_program
 from .baseline_problem import BaselineProblem, smallest_baseline
-from .compiled import SILENT, IpoptRun, run_solver
+from .compiled import SILENT, IpoptRun, local_status, run_solver
 
 _Array = NDArray[np.float64]
 
-_MAX_ITERATIONS = 150
+# Of programs that are to end at an optimum, and of elastic ones.
+_ITERATIONS = (150, 60)
 # The monotone barrier is robust but creeps, 300 steps against 10: it comes last.
 _BARRIERS = (
     {"ipopt.mu_strategy": "adaptive", "ipopt.mu_oracle": "loqo"},
@@ -55,6 +56,8 @@ _BARRIERS = (
 )
 # MUMPS spends a third less on these small systems by approximate minimum degree.
 _AMD = 0
+# How far a camera turns about its axis within one program [rad].
+_MAX_TURN = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,14 +66,19 @@ class BaselineSolution:
 
     Attributes:
         problem: The problem this answers.
-        status: `LOCALLY_OPTIMAL`, or `UNKNOWN` where IPOPT failed.
+        status: `LOCALLY_OPTIMAL`; `FEASIBLE` where an elastic program came to no end;
+            `UNKNOWN` where IPOPT failed.
         centres: O_c in [m], shape (k, 3); those of the start where it failed.
+        aims: Where the cameras look in [m], shape (k, 3).
+        rolls: Their turns [rad], shape (k,).
+        slack: What limits give way by, shape (m - e,); empty where none may.
     """
 
     problem: BaselineProblem
     status: SolveStatus
     centres: _Array
     aims: _Array
+    rolls: _Array
     slack: _Array
 
     @property
@@ -84,18 +92,25 @@ def solve_baseline(problem: BaselineProblem) -> BaselineSolution:
 
     A local optimum, the same on every run; no clock is consulted.
     """
-    program = build_baseline_program(problem)
-    for barrier in _BARRIERS:
+    program, k = build_baseline_program(problem), len(problem.centres)
+    # Where every limit gives way, whatever IPOPT comes by is of use.
+    for barrier in _BARRIERS[:1] if problem.elastic else _BARRIERS:
         run = _run_ipopt(problem, program, barrier)
-        if run.success and np.all(np.isfinite(run.x)):
-            n = problem.centres.size
-            centres, rest = run.x[:n].reshape(-1, 3), run.x[n + 1 :]
-            aims = rest[:n].reshape(-1, 3) if problem.elastic else problem.aims
-            return BaselineSolution(
-                problem, SolveStatus.LOCALLY_OPTIMAL, centres, aims, rest[n:]
-            )
+        if (run.success or problem.elastic) and np.all(np.isfinite(run.x)):
+            centres, rest = run.x[: 3 * k].reshape(-1, 3), run.x[3 * k + 1 :]
+            aims, rolls, slack = problem.aims, problem.rolls, rest
+            if problem.weights is not None:
+                aims, rolls = rest[: 3 * k].reshape(-1, 3), rest[3 * k : 4 * k]
+                slack = rest[4 * k :][: len(problem.weights)]
+            ended = local_status(held=True, settled=run.success)
+            return BaselineSolution(problem, ended, centres, aims, rolls, slack)
     return BaselineSolution(
-        problem, SolveStatus.UNKNOWN, problem.centres, problem.aims, np.zeros(0)
+        problem,
+        SolveStatus.UNKNOWN,
+        problem.centres,
+        problem.aims,
+        problem.rolls,
+        np.zeros(0),
     )
 
 
@@ -110,7 +125,7 @@ def _run_ipopt(
         | barrier
         | {
             "ipopt.mumps_pivot_order": _AMD,
-            "ipopt.max_iter": _MAX_ITERATIONS,
+            "ipopt.max_iter": _ITERATIONS[problem.elastic],
             "ipopt.tol": 1e-7,
             "ipopt.acceptable_iter": 0,
             "error_on_fail": False,
@@ -118,25 +133,30 @@ def _run_ipopt(
             "no_nlp_grad": True,
         },
     )
-    reach = _reach(problem, len(program.start))
+    least, most = _bounds(problem, program.start)
     return run_solver(
         solver,
         x0=program.start,
-        lbx=np.maximum(program.start - reach, np.where(np.isinf(reach), 0.0, -np.inf)),
-        ubx=program.start + reach,
+        lbx=least,
+        ubx=most,
         lbg=program.low,
         ubg=program.high,
     )
 
 
-def _reach(problem: BaselineProblem, n: int) -> _Array:
-    """How far each variable may go, (n,): t and slacks are held from below alone."""
-    reach, k3 = np.full(n, np.inf), problem.centres.size
+def _bounds(problem: BaselineProblem, start: _Array) -> tuple[_Array, _Array]:
+    """How far each variable may go, (n,): slacks are held from below alone."""
+    k = len(problem.centres)
     # The step's ball holds these bounds too; they keep iterates from running away.
     moves = np.full(problem.centres.shape, 1.1 * problem.max_step)
-    moves[list(problem.fixed)] = 0.0
-    reach[:k3] = moves.ravel()
-    if problem.elastic:
-        reach[k3] = 0.0
-        reach[k3 + 1 : 2 * k3 + 1] = moves.ravel()
-    return reach
+    turns = np.full(k, _MAX_TURN)
+    moves[list(problem.fixed)] = turns[list(problem.fixed)] = 0.0
+    if problem.weights is None:
+        reach = np.append(moves, np.inf)
+        return np.append((start - reach)[:-1], 0.0), start + reach
+    limits = np.full(len(problem.weights), np.inf)
+    gains = np.full(len(problem.reserves), np.inf)
+    reach = np.concatenate([moves.ravel(), [0.0], moves.ravel(), turns, limits, gains])
+    least = start - reach
+    least[7 * k + 1 :][: len(limits)] = 0.0
+    return least, start + reach

@@ -16,6 +16,7 @@ from planning.cameras.baselines.baseline_limits import (
     best_rings,
 )
 from planning.cameras.baselines.baseline_terms import BaselineTerms
+from planning.cameras.baselines.camera_moves import Looks
 from planning.cameras.baselines.seams import SampledSurface
 from planning.cameras.baselines.widest_baselines import BaselineSearch
 from planning.model.bodies import Box
@@ -262,8 +263,7 @@ def test_seams_keep_free_what_is_asked_of_the_half_fields(pair):
             BaselineLimits(THETA, 0.1, _workspace(), spare_field=spare),
         )
         .problem(
-            np.zeros((2, 3)),
-            np.zeros(2),
+            Looks(np.zeros((2, 3)), np.tile([0.0, 0.0, 1.0], (2, 1)), np.zeros(2)),
             [(0, 1)],
             np.zeros((0, 2), dtype=np.int64),
             0.1,

@@ -24,7 +24,7 @@ from solvers.poses.baseline_problem import (
 
 from .baseline_limits import BaselineLimits, RingsOnSurface, best_rings
 from .baseline_rows import check_seam
-from .camera_moves import poses_of
+from .camera_moves import Looks, poses_of
 from .seams import SampledSurface, Seam, both_orders, find_seams, spread_points
 
 _Array = NDArray[np.float64]
@@ -57,58 +57,53 @@ class BaselineTerms:
 
     def problem(
         self,
-        aims: _Array,
-        rolls: _Array,
+        looks: Looks,
         pairs: Sequence[tuple[int, int]],
         demanded: NDArray[np.int64],
         max_step: float,
     ) -> BaselineProblem:
-        """Return the program for neighbours that look at `aims` in [m], (k, 3).
+        """Return the program for neighbours that go on to look so.
 
-        `rolls` are turns against `look_at` in [rad]. `demanded` are (camera, sample)
+        `demanded` are (camera, sample)
         pairs that must be kept besides the drawn ones, (q, 2). No centre moves farther
         than `max_step` [m].
         """
         kept = np.unique(np.concatenate([self._sole_samples(), demanded]), axis=0)
         seams = find_seams(both_orders(pairs), self.surface, self.measured_by)
-        points, _ = self._seam_points(seam for seam in seams if seam.shares_border)
+        points = self._seam_points(seam for seam in seams if seam.shares_border)
         index = np.array(pairs, dtype=np.int64)
-        return self._stated(aims, rolls, index, points, kept, max_step)
+        return self._stated(looks, index, points, kept, max_step)
 
     def elastic(
         self,
-        aims: _Array,
-        rolls: _Array,
-        seams: Iterable[Seam],
+        looks: Looks,
         kept: NDArray[np.int64],
         weights: _Array,
+        reserves: _Array,
         max_step: float,
     ) -> BaselineProblem:
-        """Return the elastic program: seams, and pairs (camera, sample) with weights.
+        """Return the elastic program of pairs (camera, sample), `BaselineProblem.kept`.
 
-        A seam weighs as many samples as it has; centres and aims move no farther than
-        `max_step` [m].
+        Centres and aims move no farther than `max_step` [m].
         """
-        points, counts = self._seam_points(seams)
-        index = np.zeros((0, 2), dtype=np.int64)
-        cost = np.concatenate([counts, weights])
-        return self._stated(aims, rolls, index, points, kept, max_step, cost)
+        none, index = self._seam_points(()), np.zeros((0, 2), dtype=np.int64)
+        gives = (weights, reserves)
+        return self._stated(looks, index, none, kept, max_step, gives)
 
     def _stated(
         self,
-        aims: _Array,
-        rolls: _Array,
+        looks: Looks,
         pairs: NDArray[np.int64],
         seams: SeamPoints,
         kept: NDArray[np.int64],
         max_step: float,
-        weights: _Array | None = None,
+        gives: tuple[_Array, _Array] | None = None,
     ) -> BaselineProblem:
         limits, cameras = self.limits, self.cameras
-        space = limits.workspace
+        space, (weights, reserves) = limits.workspace, gives or (None, np.zeros(0))
         return BaselineProblem(
             centres=poses_of(cameras)[:, :3, 3],
-            aims=aims,
+            aims=looks.aims,
             pairs=pairs,
             shell=PositionShell(
                 np.array(space.centre),
@@ -120,7 +115,10 @@ class BaselineTerms:
             ),
             seams=seams,
             kept=self._kept_points(kept),
-            rolls=rolls,
+            rolls=looks.rolls,
+            ups=looks.ups,
+            weights=weights,
+            reserves=reserves,
             sides=image_sides(cameras[0].device, _SPARE_FIELD),
             max_incidence=limits.max_incidence - _SPARE_INCIDENCE,
             range_m=cameras[0].device.range_m,
@@ -128,7 +126,6 @@ class BaselineTerms:
             max_step=max_step,
             half_spaces=_held_in(space, cameras),
             fixed=tuple(c for c, camera in enumerate(cameras) if camera.existing),
-            weights=weights,
         )
 
     def holders(self, lost: NDArray[np.int64], centres: _Array) -> NDArray[np.int64]:
@@ -144,17 +141,15 @@ class BaselineTerms:
         holder = np.argmax(np.where(self.measured_by[lost], facing, -2.0), axis=1)
         return np.column_stack([holder, lost]).astype(np.int64)
 
-    def _seam_points(self, seams: Iterable[Seam]) -> tuple[SeamPoints, _Array]:
-        """Points at which (10) is stated, and how many samples each stands for."""
+    def _seam_points(self, seams: Iterable[Seam]) -> SeamPoints:
+        """Points at which (10) is stated."""
         spare, none = max(_SPARE_FIELD, self.limits.spare_field), np.zeros((0, 3))
         fields = np.zeros((0, 2))
         rows = [(fields.astype(np.int64), none, none, none, np.zeros(0), fields)]
-        counts = [np.zeros(0)]
         for seam in seams:
             pair = [self.cameras[index] for index in seam.cameras]
             test = check_seam(pair, self.surface, seam, self.limits.max_incidence)
             some = _tight_and_apart(test.slack, test.points, _SEAM_POINTS)
-            counts.append(np.full(len(some), len(seam.points) / len(some)))
             fields = np.column_stack([test.half_field1, test.half_field2])
             rows.append(
                 (
@@ -166,8 +161,7 @@ class BaselineTerms:
                     fields[some] - spare,
                 )
             )
-        points = SeamPoints(*(np.concatenate(x) for x in zip(*rows, strict=True)))
-        return points, np.concatenate(counts)
+        return SeamPoints(*(np.concatenate(x) for x in zip(*rows, strict=True)))
 
     def _sole_samples(self) -> NDArray[np.int64]:
         """Some of what each camera alone measures, the most oblique and well apart.

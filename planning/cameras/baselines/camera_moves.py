@@ -1,6 +1,7 @@
 """How cameras move: the points that they look at stay, and their rolls."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,15 @@ _Array = NDArray[np.float64]
 _SLACK = 1e-7
 
 
+@dataclass(frozen=True, eq=False)
+class Looks:
+    """Points that cameras look at [m], ups, (k, 3) each, and rolls (k,)."""
+
+    aims: _Array
+    ups: _Array
+    rolls: _Array
+
+
 def poses_of(cameras: Sequence[PlannedCamera]) -> _Array:
     """Return the poses of cameras, shape (k, 4, 4)."""
     return np.stack([camera.world_from_device for camera in cameras])
@@ -28,17 +38,16 @@ def at_poses(cameras: Sequence[PlannedCamera], poses: _Array) -> list[PlannedCam
     return [moved_to(camera, pose) for camera, pose in zip(cameras, poses, strict=True)]
 
 
-def aims_and_rolls(
+def looks_of(
     cameras: Sequence[PlannedCamera],
     measured: NDArray[np.bool_],
     points: _Array,
     workspace: Workspace,
-) -> tuple[_Array, _Array]:
-    """Return where cameras look, and their turns about it against `look_at`.
+    up: _Array | None = None,
+) -> Looks:
+    """Return where cameras look: to the mean depth of what each measures.
 
-    Returns:
-        Points on the axes at the mean depth of what each camera measures in [m],
-        (k, 3); rolls in [rad], (k,).
+    Rolls are against `up`, shape (3,); without against their own up, and hence none.
     """
     poses = poses_of(cameras)
     aims = np.empty((len(poses), 3))
@@ -47,34 +56,36 @@ def aims_and_rolls(
         looked = points[mine].mean(axis=0) if mine.any() else np.array(workspace.centre)
         depth = (looked - pose[:3, 3]) @ pose[:3, 2]
         aims[c] = pose[:3, 3] + depth * pose[:3, 2]
-    level = look_at(poses[:, :3, 3], aims, np.array(workspace.up))
+    if up is None:
+        return Looks(aims, -poses[:, :3, 1], np.zeros(len(poses)))
+    level = look_at(poses[:, :3, 3], aims, up)
     x = poses[:, :3, 0]
     along, aside = (np.einsum("ij,ij->i", x, level[:, :3, k]) for k in (0, 1))
-    return aims, np.arctan2(aside, along)
+    return Looks(aims, np.tile(up, (len(poses), 1)), np.arctan2(aside, along))
 
 
 def between(
     cameras: Sequence[PlannedCamera],
-    looks: tuple[_Array, _Array],
+    now: Looks,
     centres: _Array,
-    aims: _Array,
+    then: Looks,
     share: float | _Array,
     workspace: Workspace,
 ) -> _Array | None:
-    """Return poses (k, 4, 4) part of the way to other centres and aims, (k, 3) [m].
+    """Return poses (k, 4, 4) part of the way to centres (k, 3) [m] and other looks.
 
-    `looks` are the aims and rolls of the cameras now. Existing ones stay; mounts take
-    the next settings that they have. None where a camera can't stand so.
+    Existing cameras stay; mounts take the next settings that they have. None where a
+    camera can't stand so.
     """
-    start, (now, rolls) = poses_of(cameras), looks
+    start = poses_of(cameras)
     shares = np.broadcast_to(share, len(start))
     places = centres_between(start[:, :3, 3], centres, shares, workspace)
-    targets = now + shares[:, None] * (aims - now)
-    up = np.array(workspace.up)
+    targets = now.aims + shares[:, None] * (then.aims - now.aims)
+    rolls = now.rolls + shares * (then.rolls - now.rolls)
     for c, camera in enumerate(cameras):
         if camera.existing:
             continue
-        pose = look_at(places[c], targets[c], up, roll=float(rolls[c]))
+        pose = look_at(places[c], targets[c], now.ups[c], roll=float(rolls[c]))
         settings = settable(workspace, camera, pose[None])
         if not len(settings):
             return None

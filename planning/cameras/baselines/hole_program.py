@@ -18,6 +18,7 @@ from solvers.poses.baseline_problem import BaselineProblem
 
 from .baseline_limits import BaselineLimits, RingsOnSurface, best_rings
 from .baseline_terms import BaselineTerms, image_sides
+from .camera_moves import Looks
 from .seams import (
     SampledSurface,
     Seam,
@@ -28,12 +29,13 @@ from .seams import (
 _Array = NDArray[np.float64]
 _Mask = NDArray[np.bool_]
 
-# Samples that each camera keeps, and of the hole that it is to take over.
-_KEPT, _HOLE = 24, 24
+# Samples that each camera keeps, of the hole that it is to take over, and at each end
+# of a part beside that.
+_KEPT, _HOLE, _END = 24, 24, 6
 # Margins above this, of a cosine, aren't used up within a step.
 _AT_STAKE = 0.4
 # Limits that are so far past weigh half as much as those just past.
-_HALF_WEIGHT = 0.3
+_HALF_WEIGHT = 0.15
 # What a sample weighs that a program before lost.
 _DEMANDED = 3.0
 # As how far past a sample counts that only a shadow keeps from a camera.
@@ -61,9 +63,9 @@ class HoleTerms:
     rings: RingsOnSurface | None = None
 
     def problem(
-        self, aims: _Array, rolls: _Array, lost: NDArray[np.int64], max_step: float
+        self, looks: Looks, lost: NDArray[np.int64], max_step: float
     ) -> BaselineProblem:
-        """Return the elastic program about aims [m] and rolls [rad] as they are.
+        """Return the elastic program about looks as they are.
 
         Samples that the program before lost, `lost`, are among those kept.
         """
@@ -83,12 +85,20 @@ class HoleTerms:
         terms = BaselineTerms(
             self.cameras, self.measured, self.surface, self.limits, self.rings
         )
+        held, beyond, reserves = [kept[0]], [kept[0]], [np.zeros(0)]
+        for seam in self.ends(past):
+            one, two = seam.cameras
+            some = spread_points(self.surface.points[seam.points], _END)
+            ends, n = seam.points[some], len(some)
+            held.append(np.column_stack([np.full(n, one), ends]))
+            beyond.append(np.column_stack([np.full(n, two), seam.beyond[some]]))
+            reserves.append(margins[ends, one])
+            weights.append(np.full(n, len(seam.points) / n))
         return terms.elastic(
-            aims,
-            rolls,
-            self.ends(past),
-            np.concatenate(kept),
+            looks,
+            np.concatenate([*kept, *held, *beyond]),
             np.concatenate(weights),
+            np.concatenate(reserves),
             max_step,
         )
 

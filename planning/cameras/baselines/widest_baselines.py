@@ -16,7 +16,7 @@ from solvers.poses.baseline_problem import smallest_baseline
 
 from .baseline_limits import BaselineLimits, RingsOnSurface
 from .baseline_terms import BaselineTerms
-from .camera_moves import aims_and_rolls, at_poses, between, centres_between, poses_of
+from .camera_moves import at_poses, between, centres_between, looks_of, poses_of
 from .seams import SampledSurface, neighbouring_pairs, overlap_components
 
 _Array = NDArray[np.float64]
@@ -88,8 +88,13 @@ class BaselineSearch:
         self._poses = poses_of(self.cameras)
         self._measured = self._evaluate(self._poses)
         self._floor = _count(self._measured)
-        self._aims, self._rolls = aims_and_rolls(
-            self.cameras, self._measured, self.surface.points, self.limits.workspace
+        space = self.limits.workspace
+        self._looks = looks_of(
+            self.cameras,
+            self._measured,
+            self.surface.points,
+            space,
+            np.array(space.up),
         )
         self._pairs = neighbouring_pairs(self._measured, self.surface)
         self._groups = len(overlap_components(self._measured))
@@ -133,7 +138,7 @@ class BaselineSearch:
                 self.rings,
             )
             solution = solve_baseline(
-                terms.problem(self._aims, self._rolls, self._pairs, demanded, reach)
+                terms.problem(self._looks, self._pairs, demanded, reach)
             )
             if not (solution.status.has_point and self._gains(solution.centres)):
                 break
@@ -170,8 +175,7 @@ class BaselineSearch:
         if self._spent >= self.max_evaluations:
             return False, none
         cameras, space = at_poses(self.cameras, self._poses), self.limits.workspace
-        looks = (self._aims, self._rolls)
-        poses = between(cameras, looks, centres, self._aims, 1.0, space)
+        poses = between(cameras, self._looks, centres, self._looks, 1.0, space)
         if poses is None or not self._gains(poses[:, :3, 3]):
             return False, none
         centres = poses[:, :3, 3]

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.cameras.baselines.camera_moves import (
-    aims_and_rolls,
+    Looks,
     at_poses,
     between,
+    looks_of,
 )
 from planning.cameras.baselines.hole_program import HoleTerms
 
@@ -27,7 +28,7 @@ _CLOSABLE = 0.25
 _REACH, _SHRINK = 0.5, 0.4
 _STEPS = (1.0, 0.5)
 # Programs in a row that measure no more, until it is given up.
-_FAILED = 3
+_FAILED = 6
 # A program that measures less than this share of what is missing won't do in the rest.
 _WORTH = 0.1
 
@@ -82,9 +83,7 @@ def _taken_over(
     from solvers.poses.baseline_program import solve_baseline
 
     space = problem.limits.workspace
-    aims, rolls = aims_and_rolls(
-        placed.cameras, placed.measured, problem.surface.points, space
-    )
+    now = looks_of(placed.cameras, placed.measured, problem.surface.points, space)
     terms = HoleTerms(
         placed.cameras,
         placed.measured,
@@ -93,11 +92,10 @@ def _taken_over(
         problem.limits,
         problem.rings,
     )
-    solution = solve_baseline(terms.problem(aims, rolls, lost, reach))
+    solution = solve_baseline(terms.problem(now, lost, reach))
     for share in _STEPS if solution.status.has_point else ():
-        poses = between(
-            placed.cameras, (aims, rolls), solution.centres, solution.aims, share, space
-        )
+        then = Looks(solution.aims, now.ups, solution.rolls)
+        poses = between(placed.cameras, now, solution.centres, then, share, space)
         if poses is None:
             continue
         moved = problem.placed(at_poses(placed.cameras, poses))

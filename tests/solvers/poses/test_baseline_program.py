@@ -238,8 +238,7 @@ def test_elastic_cameras_close_a_hole_at_d_max():
     Of what closes the hole the nearest is taken: the baseline ends at 2 S sin(eta).
     """
     limit = round_body_limit(RADIUS, RING, THETA)
-    apart = 1.1 * limit.half_angle
-    start = replace(_round_body(apart, apart), weights=np.ones(2))
+    start = _parted(1.1 * limit.half_angle)
     solution = solve_baseline(start)
     assert solution.status is SolveStatus.LOCALLY_OPTIMAL
     d = np.linalg.norm(np.subtract(*solution.centres))
@@ -249,6 +248,51 @@ def test_elastic_cameras_close_a_hole_at_d_max():
     # A hole that cameras can't come near enough to leaves what they can't do.
     held = solve_baseline(replace(start, max_step=0.02))
     assert held.slack.sum() > 0.05
+
+
+def _parted(apart):
+    """Cameras at -apart and apart; each part ends at E, where its margin is 0."""
+    problem = _round_body(apart, apart)
+    normals = problem.seams.outward
+    ends = np.array([0, 1, 1, 0]), np.tile(RADIUS * normals, (2, 1))
+    kept = _kept(*ends, np.tile(normals, (2, 1)))
+    elastic = {"weights": np.ones(2), "reserves": np.zeros(2), "kept": kept}
+    return replace(problem, seams=NO_SEAMS, **elastic)
+
+
+def test_a_camera_that_gains_at_the_end_of_its_part_closes_the_hole_alone():
+    """The other is fixed, so that the whole gap is the first one's to close."""
+    limit = round_body_limit(RADIUS, RING, THETA)
+    solution = solve_baseline(replace(_parted(1.1 * limit.half_angle), fixed=(1,)))
+    d = np.linalg.norm(np.subtract(*solution.centres))
+    # A sum of cosines is the stricter, the more unequal the angles are.
+    assert 0.99 * limit.d_max < d < limit.d_max
+    np.testing.assert_allclose(solution.slack, 0.0, atol=1e-3)
+    # What the part doesn't end by must be used up first.
+    spare = replace(_parted(1.1 * limit.half_angle), reserves=np.full(2, 0.05))
+    nearer = np.linalg.norm(np.subtract(*solve_baseline(spare).centres))
+    assert nearer < 0.98 * limit.d_max
+
+
+def test_elastic_cameras_roll_to_what_a_wide_image_holds():
+    """A strip square to the image's long side, which the camera can only turn to."""
+    centre, side = np.array([[RING, 0.0, 0.0]]), np.array([0.2, 0.05])
+    points = [[RADIUS, 0.0, z] for z in (-0.1, 0.1)]
+    problem = _problem(
+        centre,
+        kept=_kept([0, 0], points, [[1.0, 0.0, 0.0]] * 2),
+        sides=np.array([-side, side]),
+        pairs=np.zeros((0, 2), dtype=np.int64),
+        weights=np.ones(2),
+        # From upright no turn is better than another.
+        rolls=np.array([0.3]),
+        max_step=0.02,
+    )
+    solution = solve_baseline(problem)
+    # Outside by 0.125 cos(roll) - 0.05.
+    assert solution.rolls[0] == pytest.approx(0.8, abs=0.01)
+    again = solve_baseline(replace(problem, rolls=solution.rolls))
+    np.testing.assert_allclose(again.slack, 0.0, atol=1e-3)
 
 
 def test_elastic_cameras_turn_to_what_is_outside_their_image():
@@ -294,9 +338,13 @@ def test_what_weighs_less_gives_way(heavy):
 
 
 def test_derivatives_of_the_elastic_program_agree_with_finite_differences():
-    kept = _kept([0, 1], [[RADIUS, 0.01, 0.02]] * 2, [[1, 0, 0]] * 2)
-    problem = replace(_round_body(0.5, 0.6), kept=kept, rolls=np.array([0.3, -0.2]))
-    _check_derivatives(replace(problem, weights=np.ones(4)))
+    problem = replace(_round_body(0.5, 0.6), rolls=np.array([0.3, -0.2]))
+    problem = replace(problem, kept=_parted(0.5).kept, seams=NO_SEAMS)
+    _check_derivatives(
+        replace(problem, weights=np.ones(2), reserves=np.array([0.02, 0.03]))
+    )
+    turned = replace(problem, weights=np.ones(4), ups=np.array([[0.1, 0.3, 1.0]] * 2))
+    _check_derivatives(turned)
 
 
 def test_derivatives_agree_with_finite_differences():
