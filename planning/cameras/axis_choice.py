@@ -105,7 +105,7 @@ def standing_axes(
         centred = centred_axes(scene, projectors, margin)
         samples, measured = measured_of(scene, centred, views, target)
         cover = candidate_cover(scene, measured, samples)
-        if axis == "centred" or cover.confirms(np.arange(cover.n_existing)):
+        if axis == "centred" or cover.enough(np.arange(cover.n_existing)):
             return centred, "centred"
     cameras = views.cameras[: n_fixed(scene)]
     lit = lit_samples(scene, projectors, target)

@@ -131,7 +131,7 @@ def confirmed_cover(
             return cover
         fresh = scene.target_samples(DRAWS.fresh_cameras.later(attempt))
         lit, seen = measured_of(scene, projectors, cover.candidates, fresh)
-        if candidate_cover(scene, seen, lit).confirms(cover.selection.chosen):
+        if candidate_cover(scene, seen, lit).enough(cover.selection.chosen):
             return cover
         target = merged(target, fresh)
         samples = lit_samples(scene, projectors, target)

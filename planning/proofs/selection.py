@@ -158,12 +158,6 @@ class CandidateCover:
         """Return whether candidates cover the share and the floors of all regions."""
         return self.quotas.enough(self.covered(chosen))
 
-    def confirms(self, chosen: NDArray[np.int64]) -> bool:
-        """Return whether candidates cover enough of samples that are fresh."""
-        reached = self.covers.any(axis=1).sum()
-        total = bool(self.n_covered(chosen) >= self.share * reached)
-        return total and self.enough(chosen)
-
     def most_covering(
         self,
         count: int,

@@ -82,7 +82,7 @@ def make_claims(scene: Scene, devices: Devices) -> Claims:
     coverage = coverage.changed(**_blocked(planned, devices, target))
     lit, margin = target.first == LIT, lit_margins(scene, devices.projectors, samples)
     served = assigned_projectors(lit, margin)
-    region_samples = RegionSamples.of(scene, devices, target)
+    region_samples = RegionSamples.of(scene, devices, target, margin)
     alone = seen & (seen.sum(axis=1) == 1)[:, None]
     return Claims(
         coverage,

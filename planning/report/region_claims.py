@@ -57,16 +57,25 @@ class RegionSamples:
     measured_by: _Mask
 
     @classmethod
-    def of(cls, scene: Scene, devices: Devices, judged: Judged) -> "RegionSamples":
-        """Return judged samples of the target, and what large regions lack."""
-        parts = [judged]
+    def of(
+        cls,
+        scene: Scene,
+        devices: Devices,
+        judged: Judged,
+        margins: NDArray[np.float64],
+    ) -> "RegionSamples":
+        """Return judged samples of the target, and what large regions lack.
+
+        The margins of the former are (n, n_projectors) [rad].
+        """
+        parts, every = [judged], [margins]
         more = scene.more_of_regions(judged.target, DRAWS.region_claims)
         if more is not None:
             parts.append(Judged.of(scene, devices, more))
+            every.append(lit_margins(scene, devices.projectors, more))
         target = (
             parts[0].target if len(parts) == 1 else merged(*(p.target for p in parts))
         )
-        margins = lit_margins(scene, devices.projectors, target)
         first = np.concatenate([part.first for part in parts])
 
         def of_all(name: str) -> _Mask:
@@ -81,7 +90,7 @@ class RegionSamples:
             of_all("by_projectors"),
             of_all("by_cameras"),
             np.concatenate([part.causes(scene, devices) for part in parts]),
-            assigned_projectors(first == LIT, margins),
+            assigned_projectors(first == LIT, np.concatenate(every)),
             of_all("measured_by"),
         )
 

@@ -97,7 +97,6 @@ def _from_below(
         if integers.selected is not None:
             selected = better(cover, selected, integers.selected)
         bound = math.ceil((integers.bound or 0.0) - 1e-5)
-        # A bound above a cover that was counted here is none.
-        if lower < bound <= selected.size:
+        if bound > lower:
             lower, proof = bound, f"{INTEGER_PROOF}, {FLOORS_COUNTED}"
     return replace(found, selected=selected, bound=float(lower), proof=proof)

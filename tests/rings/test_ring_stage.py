@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.factories import make_scene
-from support.plain_shapes import box
+from support.plain_shapes import box, joined, torus
 
 from geometry.devices import PinholeModel
 from geometry.mesh.mesh import TriangleMesh
@@ -264,6 +264,17 @@ def test_a_pin_that_rays_miss_keeps_its_ring():
     coordinate = pattern_of(projector).coordinate(np.array(pin[:1]))[0]
     assert np.abs(shown - coordinate).min() < 0.003
     assert len(shown) < 40
+
+
+def test_the_last_ring_is_shown_for_what_lies_beyond_it():
+    """A small ball, and a hoop from 65 mm on about the axis; the last ring is 60 mm."""
+    hoop = torus(0.08, 0.015)
+    upright = TriangleMesh(hoop.vertices[:, [0, 2, 1]], hoop.faces[:, ::-1])
+    mesh = joined(sphere(0.012, subdivisions=3), upright)
+    scene, projector, _ = made("parallel", mesh=mesh)
+    whole = replace(projector, ring_radii=np.arange(1, 7) * 0.01)
+    shown = without_idle(scene, whole, 0.0).ring_radii
+    np.testing.assert_allclose(shown, [0.01, 0.02, 0.06])
 
 
 def test_a_centred_axis_runs_through_the_middle_of_what_is_lit(bench):

@@ -68,7 +68,7 @@ def _axes_lines(plan: RigPlan) -> list[str]:
     )
     if axes.other is not None:
         line += (
-            f"; {axes.other.axis} ones would measure "
+            f"; evenly spaced {axes.other.axis} ones would measure "
             f"{percent(axes.other.measured_m2 / areas.lit_m2)} with "
             f"{_rings_words(plan, axes.other.projectors)}"
         )
