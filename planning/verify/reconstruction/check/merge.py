@@ -25,12 +25,13 @@ from .tiles import Tiles, plane_normals
 _DOUBT_PX = 0.5
 # Points of two projectors are of one spot in a cell so large [px].
 _SPOT_PX = 1.5
-# In cells of this share of a ring's pitch those go whose sigma is so many times that of
-# another projector: their rings fell on other places, but hardly measure them.
-_PLACE, _MUCH_WORSE = 0.5, 4.0
+# In cells so large those go whose sigma is so many times that of another pair: they
+# fell on other places, but hardly measure them.
+_PLACE_PX, _MUCH_WORSE = 4.0, 6.0
 # The projector blurs the edges that it draws, but not steps. Edges are taken for steps
 # below these shares of a pair's median blur: if no other camera confirms them; if an
-# edge of another projector lies there, too; if another camera contradicts them.
+# edge of another projector lies there, too, or its light differs; if another camera
+# contradicts them. The light's word counts one less against what a camera confirms.
 _SHARP, _CROSSED, _CONTRADICTED = 0.5, 0.75, 0.9
 
 
@@ -74,10 +75,11 @@ def merge(
     """
     shared, crossed, differs = compare_overlaps(cloud, plan, lit)
     curves = RingCurves.of(cloud, plan)
-    confirmed, contradicted = curves.evidence()
     sharpness = _sharpness(cloud)
-    steps = differs | (~confirmed & (sharpness < _SHARP))
-    steps |= crossed & (sharpness < _CROSSED)
+    confirmed, contradicted = curves.evidence(sharpness)
+    steps = ~confirmed & ((sharpness < _SHARP) | differs)
+    steps |= crossed & (sharpness < np.where(confirmed, _SHARP, _CROSSED))
+    steps |= differs & (sharpness < _CROSSED)
     steps |= contradicted & (sharpness < _CONTRADICTED)
     doubtful = ~confirmed & (sharpness < _CROSSED)
 
@@ -101,11 +103,20 @@ def merge(
 
     stays = ~(steps | redundant)
     size = pixel_sizes(cloud, plan)
-    for side_px, ratio in (_SPOT_PX, 1.0), (_PLACE * pitch_px, _MUCH_WORSE):
-        both = np.flatnonzero(stays & shared)
-        if len(both):
-            cell_m = side_px * float(np.median(size[both]))
-            stays[both] = _good_projectors(fitted, both, sigma, cell_m, ratio)
+    projector = cloud.projector.astype(np.int64)
+    # What one camera sees at a slant another's point doesn't stand for.
+    octant = ((normals > 0.0) @ np.array([1, 2, 4])).astype(np.int64)
+    camera = cloud.camera.astype(np.int64)
+    pair = projector * len(plan.cameras) + camera
+    for among, side_px, kind, source, ratio in (
+        (stays & shared, _SPOT_PX, camera, projector, 1.0),
+        (stays, _PLACE_PX, octant, pair, _MUCH_WORSE),
+    ):
+        some = np.flatnonzero(among & stays)
+        if len(some):
+            side_m = side_px * float(np.median(size[some]))
+            cell = _cells(fitted.points[some], kind[some], side_m)
+            stays[some] = _sure(cell, source[some], sigma[some], ratio)
     return Merged(
         fitted.take(stays), stays, steps, shared, normals[stays], sigma[stays]
     )
@@ -123,23 +134,20 @@ def _sharpness(cloud: Cloud) -> Array:
     return sharpness
 
 
-def _good_projectors(
-    cloud: Cloud, some: Indices, sigma: Array, cell_m: float, ratio: float
-) -> Mask:
-    """Which of some points are of the best projector in their cell, or about as sure.
+def _cells(points: Array, kind: Indices, side_m: float) -> Array:
+    """Return a number of each point's cube in space and kind, (n,)."""
+    x, y, z = np.floor((points - points.min(axis=0)) / side_m).T
+    cube = (x * (y.max() + 1.0) + y) * (z.max() + 1.0) + z
+    return cube * (kind.max() + 1.0) + kind
 
-    Cells are cubes in space, of each camera its own.
-    """
-    points, camera = cloud.points[some], cloud.camera[some]
-    projector, sigma = cloud.projector[some], sigma[some]
-    x, y, z = np.floor((points - points.min(axis=0)) / cell_m).T
-    key = (x * (y.max() + 1.0) + y) * (z.max() + 1.0) + z
-    key = key * (camera.max() + 1.0) + camera
+
+def _sure(cell: Array, source: Indices, sigma: Array, ratio: float) -> Mask:
+    """Which points are of the best one's source in their cell, or about as sure."""
     # Without a normal a point gives way to any other.
     known = np.where(np.isfinite(sigma), sigma, np.inf)
-    order = np.lexsort((known, key))
-    first = np.flatnonzero(np.diff(key[order], prepend=-1.0))
+    order = np.lexsort((known, cell))
+    first = np.flatnonzero(np.diff(cell[order], prepend=-1.0))
     best = np.empty_like(order)
     best[order] = np.repeat(order[first], np.diff(first, append=len(order)))
-    good = projector == projector[best]
+    good = source == source[best]
     return good | ((ratio > 1.0) & (known <= ratio * known[best]))

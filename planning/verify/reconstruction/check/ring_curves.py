@@ -32,6 +32,8 @@ _STEEPEST, _SURE_SLOPE = 2.0, 0.5
 _SIGMAS, _SURE_SIGMAS = 4.0, 3.0
 # Estimates within different reaches agree within this many of their deviations.
 _AGREE = 2.0
+# An edge below this share of another's blur doesn't contradict it.
+_STEP = 0.65
 # Share of a point's slide that counts whatever the curve's slope is.
 _ASTRAY = 0.1
 
@@ -102,19 +104,29 @@ class RingCurves:
         kept = points[self.order]
         return self._linked(kept[self.one] & kept[self.other])
 
-    def evidence(self) -> tuple[Mask, Mask]:
-        """Return which points another camera confirms, and which one contradicts."""
+    def evidence(self, sharpness: Array) -> tuple[Mask, Mask]:
+        """Return which points another camera confirms, and which one contradicts.
+
+        A much sharper edge may be the step itself and doesn't contradict. Sharpness is
+        blur as a share of what is usual, shape (n,).
+        """
         two = self._linked(self._of_two_cameras())
         spread = np.linalg.norm(self.slide, axis=1)
-        agree = two._on_one_surface(spread)
+        together, sharp = two._together(spread), sharpness[self.order]
+        agree, apart = two._linked(together), two._linked(~together)
         noise = np.hypot(spread[agree.one], spread[agree.other])
         limit = _SURE_SIGMAS * noise + _SURE_SLOPE * agree.apart
         surely = agree._linked(np.abs(agree.rise) <= limit)
-        ends = [np.concatenate([some.one, some.other]) for some in (two, agree, surely)]
-        near, may_be, confirmed = np.zeros((3, len(self.order)), dtype=bool)
-        for met, at in zip((near, may_be, confirmed), ends, strict=True):
-            met[at] = True
-        return self._in_cloud(confirmed), self._in_cloud(near & ~may_be)
+        ends = (apart.one, apart.other), (apart.other, apart.one)
+        against = [at[~(sharp[by] < _STEP * sharp[at])] for at, by in ends]
+        may_be, confirmed, contradicted = np.zeros((3, len(self.order)), dtype=bool)
+        for met, at in (
+            (may_be, [agree.one, agree.other]),
+            (confirmed, [surely.one, surely.other]),
+            (contradicted, against),
+        ):
+            met[np.concatenate(at)] = True
+        return self._in_cloud(confirmed), self._in_cloud(contradicted & ~may_be)
 
     def fitted(self) -> tuple[Array, Array, Mask]:
         """Fit a line through the points near each, of whatever cameras, within reach.
@@ -186,9 +198,11 @@ class RingCurves:
         return self.camera[self.one] != self.camera[self.other]
 
     def _on_one_surface(self, sigma: Array) -> "RingCurves":
+        return self._linked(self._together(sigma))
+
+    def _together(self, sigma: Array) -> Mask:
         noise = np.hypot(sigma[self.one], sigma[self.other])
-        limit = _SIGMAS * noise + _STEEPEST * self.apart
-        return self._linked(np.abs(self.rise) <= limit)
+        return np.abs(self.rise) <= _SIGMAS * noise + _STEEPEST * self.apart
 
     def _linked(self, chosen: Mask) -> "RingCurves":
         names = "one", "other", "apart", "rise", "apart_px"
