@@ -26,7 +26,10 @@ from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
 from planning.model.surface import Surface
-from planning.report.advice.floor_relaxations import with_floor_relaxations
+from planning.report.advice.floor_relaxations import (
+    with_floor_relaxations,
+    with_small_floor,
+)
 from planning.report.advice.what_helps import with_fewer_needed, with_relaxations
 from planning.report.entries.cost_entry import cost_record
 from planning.report.entries.overlaps import overlap_records
@@ -60,6 +63,8 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
         regions = with_floor_relaxations(
             regions, claims.region_samples, partial.request.rig, devices
         )
+        if not partial.request.evaluates:
+            regions = with_small_floor(regions, partial.stage.candidates)
         certificates = with_fewer_needed(certificates, partial, clock)
     overlaps, schedule = overlap_records(among, devices.projectors)
     surface = _surface(scene, devices)

@@ -26,7 +26,11 @@ from planning.cli.main import commands
 from planning.model.document.coverage_records import RegionRecord
 from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
-from planning.report.advice.floor_relaxations import with_floor_relaxations
+from planning.projectors.candidate_set import CandidateSet
+from planning.report.advice.floor_relaxations import (
+    with_floor_relaxations,
+    with_small_floor,
+)
 from planning.report.claims import make_claims
 from planning.report.drawing.panel import Panel
 from planning.report.drawing.picture_view import fitted
@@ -134,6 +138,32 @@ def _records(claims):
             coverage=claim.coverage,
         )
         for number, claim in enumerate(claims.regions)
+    )
+
+
+def test_of_the_largest_dark_region_without_a_floor_one_is_priced(world):
+    scene, devices, claims = world
+    up = np.array([0.0, 1.0, 0.0])
+    below = look_at(np.array([0.0, 0.0, -1.1]), np.zeros(3), up=up)
+    beneath = {"world_from_device": below, "world_from_ring": below}
+    poses = (*devices.reference_projectors, replace(devices.projectors[0], **beneath))
+    required = replace(scene.requirements, region_share=0.5, dominant_coverage=0.6)
+    scene = make_scene(BALL, required, region=REGION)
+    samples = scene.target_samples(replace(DRAWS.claims, count=1000))
+    # No region is half of all; the grazed band and the far side are lit too little.
+    records = tuple(
+        record.changed(coverage=record.coverage.changed(floor=None))
+        for record in _records(claims)
+    )
+    told = with_small_floor(records, CandidateSet.over(scene, samples, poses))
+    assert [bool(record.coverage.relaxations) for record in told] == [False] * 3 + [
+        True
+    ]
+    share = int(1e4 * _area(REGION == 3) / _area(REGION >= 0)) / 1e4
+    # Light from below reaches the far side, but not three fifths of all.
+    assert told[3].coverage.relaxations == (
+        f"[requirements] region_share = {share:g} gives it a floor and takes "
+        f"2 projectors of the candidates",
     )
 
 

@@ -80,7 +80,8 @@ class RegionCoverage(Part):
         uncovered_by_cause: Area that isn't measured.
         measured_by: Area that each camera measures, of those that measure any of it.
         floor: Whether enough of it is lit and measured; None: it has no floor.
-        relaxations: What would let a missed floor be met.
+        relaxations: What would let a missed floor be met; of the largest dark region
+            too small for a floor what one would cost.
     """
 
     samples: int

@@ -4,11 +4,15 @@ Devices stay where the plan has them. Of the samples of the region that they lea
 or unmeasured, each asks a value of a limit; sorted, these say how far it must give way.
 """
 
+from dataclasses import replace
 from functools import reduce
 
 import numpy as np
 
 from planning.model.document.coverage_records import RegionRecord
+from planning.model.words import count_words
+from planning.projectors.candidate_set import CandidateSet
+from planning.proofs.selection import fewest_count
 from planning.report.judged import Devices
 from planning.report.region_claims import RegionSamples
 from planning.rig.rig import Rig
@@ -21,6 +25,9 @@ from .least_changes import (
     relaxations_of_cameras,
     relaxations_of_projectors,
 )
+
+# Shares are told in parts of so much, rounded down.
+_SHARES = 10_000
 
 
 def with_floor_relaxations(
@@ -41,6 +48,42 @@ def with_floor_relaxations(
             )
         )
         if (areas := region.coverage) is not None and areas.floor == "missed"
+        else region
+        for region in regions
+    )
+
+
+def with_small_floor(
+    regions: tuple[RegionRecord, ...], candidates: CandidateSet
+) -> tuple[RegionRecord, ...]:
+    """Return regions with what a floor costs of the largest too small for one.
+
+    Of those of which less is lit than of a large region must be: so many projectors of
+    the candidates.
+    """
+    scene = candidates.scene
+    floor, areas = scene.requirements.region_coverage, scene.mesh.face_areas
+    dark = [
+        region
+        for region in regions
+        if (lit := region.coverage) is not None
+        and lit.floor is None
+        and lit.lit_m2 < floor * lit.reachable_by_projectors_m2
+    ]
+    if not dark:
+        return regions
+    largest = max(dark, key=lambda region: region.area_m2)
+    share = float(largest.area_m2 / areas[scene.target_faces].sum())
+    share = np.floor(_SHARES * share) / _SHARES
+    required = replace(scene.requirements, region_share=share)
+    asked = replace(candidates, scene=replace(scene, requirements=required))
+    told = (
+        f"[requirements] region_share = {share:g} gives it a floor and takes "
+        f"{count_words(fewest_count(asked.cover), 'projector')} of the candidates",
+    )
+    return tuple(
+        region.changed(coverage=region.coverage.changed(relaxations=told))
+        if region is largest and region.coverage is not None
         else region
         for region in regions
     )

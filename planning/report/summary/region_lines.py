@@ -65,7 +65,7 @@ def _small_lines(plan: RigPlan) -> Iterator[str]:
         f"{len(below)} of {count_words(len(small), 'region')} under "
         f"{percent(required.region_share)} of the target, for which there is no "
         f"floor, would miss it; the largest: {region_words(plan, region)}, "
-        f"{_deed(areas)}"
+        f"{_deed(areas)}{''.join(f'; {change}' for change in areas.relaxations)}"
     )
 
 
