@@ -1,7 +1,7 @@
 """Merged clouds against their parts: the paper's box and face, and planned rigs."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +11,7 @@ from support import shared_meshes
 from benchmarks.paper.squarest_projector import squarest_projectors
 from geometry.files.readers import load_mesh
 from geometry.mesh.sampling import SurfaceSamples, sample_surface
+from geometry.rays.rays import RayCaster
 from planning.experiments.ring_outcomes import lit_and_seen
 from planning.experiments.run import DARK
 from planning.experiments.setups import paper_experiment
@@ -24,7 +25,7 @@ from planning.verify.reconstruction.check.accuracy import (
     nearest_distance,
 )
 from planning.verify.reconstruction.check.overlaps import pixel_sizes
-from planning.verify.reconstruction.cloud import Cloud
+from planning.verify.reconstruction.cloud import TEXTURE_PX, Cloud
 from planning.verify.reconstruction.reconstruct import reconstruct
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.scanner import Scanner
@@ -39,8 +40,8 @@ MESHES = (
 )
 ALBEDO = {"plain": 0.0, "textured": 0.5}
 N_SAMPLES = 20_000
-# A point that is farther off isn't one of the surface: the check's limit of the rms.
-RIGHT_M = 1e-4
+# A right point lies within so many of its deviations of the place its pixel looks at.
+_SIGMAS = 3.0
 _OUTLIER_M = 1e-3
 _FEWEST = 50
 _MM = 1e3
@@ -55,10 +56,12 @@ class Row:
         rms_m: Of the best pair, the best projector, all points, merged as before, and
             merged [m].
         false: Share beyond 1 mm: of all points, merged as before, merged.
-        complete: At half a gap, one and two, of the same three.
-        right: Likewise, by points within `RIGHT_M` alone.
-        beside: Rms of merged points over that of a part at the same place: the worst
-            of all pairs, and of all projectors.
+        complete: At half a gap, one and two, of the same three; and the samples that
+            merging lost, and won, at half a gap.
+        right: Likewise, by right points alone, where their pixels look.
+        n_samples: Of the surface.
+        beside: Rms of merged points over that of a part at the same place: the worst of
+            all pairs within a pixel, within a quarter of a gap, and of all projectors.
         shares: Points in the light of two projectors, redundant, and false at steps.
     """
 
@@ -67,7 +70,8 @@ class Row:
     false: tuple[float, ...]
     complete: tuple[tuple[float, ...], ...]
     right: tuple[tuple[float, ...], ...]
-    beside: tuple[float, float]
+    n_samples: int
+    beside: tuple[float, ...]
     shares: tuple[float, ...]
 
 
@@ -109,21 +113,25 @@ def compare(name: str, scanner: Scanner, light: Photometry) -> Row:
     ]
     best = [min(_rms(errors[0][of]) for of in kind) for kind in parts]
 
-    def beside(of: Array) -> float:
-        near, _ = KDTree(cloud.points[of]).query(merged.cloud.points)
-        return _rms(errors[2][near <= 0.25 * tau]) / _rms(errors[0][of])
+    pixel = float(np.median(pixel_sizes(cloud, scanner)))
 
+    def beside(of: Array, reach_m: float) -> float:
+        near, _ = KDTree(cloud.points[of]).query(merged.cloud.points)
+        return _rms(errors[2][near <= reach_m]) / _rms(errors[0][of])
+
+    right = cloud, clouds[1], cloud.take(merged.stays)
     steps = float(merged.steps.mean())
     return Row(
         name,
         (*best, *map(_rms, errors)),
         tuple(float(np.mean(error > _OUTLIER_M)) for error in errors),
-        tuple(_complete(one, samples, tau) for one in clouds),
-        tuple(
-            _complete(one.take(error <= RIGHT_M), samples, tau)
-            for one, error in zip(clouds, errors, strict=True)
+        _complete(clouds, samples, tau),
+        _complete([_right(one, scanner) for one in right], samples, tau),
+        len(samples),
+        (
+            max(beside(of, pixel) for of in parts[0]),
+            *(max(beside(of, 0.25 * tau) for of in kind) for kind in parts),
         ),
-        (max(map(beside, parts[0])), max(map(beside, parts[1]))),
         (float(merged.shared.mean()), result.redundant_fraction - steps, steps),
     )
 
@@ -142,9 +150,31 @@ def _rms(error: Array) -> float:
     return float(np.sqrt(np.mean(error**2)))
 
 
-def _complete(cloud: Cloud, samples: SurfaceSamples, tau: float) -> tuple[float, ...]:
-    near = nearest_distance(cloud, samples, 2.01 * tau)
-    return tuple(float(np.mean(near <= gaps * tau)) for gaps in (0.5, 1.0, 2.0))
+def _right(cloud: Cloud, scanner: Scanner) -> Cloud:
+    """Return the right points, each at the place of the surface its pixel looks at."""
+    caster, seen = (
+        RayCaster(scanner.mesh, threads=1),
+        np.full_like(cloud.points, np.nan),
+    )
+    for c, camera in enumerate(scanner.cameras):
+        of = np.flatnonzero(cloud.camera == c)
+        faces, away = caster.first_hits(camera.centre, cloud.rays[of])
+        hit = np.where(faces >= 0, away, np.nan)[:, None]
+        seen[of] = camera.centre + hit * cloud.rays[of]
+    off = np.linalg.norm(cloud.points - seen, axis=1)
+    sigma = np.linalg.norm(cloud.shift, axis=1) * np.hypot(cloud.noise_px, TEXTURE_PX)
+    return replace(cloud, points=seen).take(off <= _SIGMAS * sigma)
+
+
+def _complete(
+    clouds: Sequence[Cloud], samples: SurfaceSamples, tau: float
+) -> tuple[tuple[float, ...], ...]:
+    nears = [nearest_distance(one, samples, 2.01 * tau) for one in clouds]
+    before, after = nears[0] <= 0.5 * tau, nears[-1] <= 0.5 * tau
+    return (
+        *(tuple(float(np.mean(n <= k * tau)) for k in (0.5, 1.0, 2.0)) for n in nears),
+        (float(np.sum(before & ~after)), float(np.sum(after & ~before))),
+    )
 
 
 def print_tables() -> None:
@@ -157,27 +187,31 @@ def print_tables() -> None:
             rows.append(compare(f"{name} | {words}", scanner, lit))
             print(rows[-1], file=sys.stderr, flush=True)
     print("Rms [mm] and share beyond 1 mm. Before: one projector a tile, one camera a")
-    print("cell. Same place: rms of merged points within a quarter of a gap of a part,")
-    print("over that part's; the worst of all pairs, of all projectors.\n")
+    print(
+        "cell. Same place: rms of merged points within a pixel, then a quarter of a gap"
+    )
+    print("of a part's, over that part's; the worst of all pairs, of all projectors.\n")
     parts = "best pair | best projector | all points | before | now"
-    more = "> 1 mm: all, before, now | same place: pair, projector"
+    more = "> 1 mm: all, before, now | same place: pair, pair, projector"
     print(f"| object | albedo | {parts} | {more} |")
     print("|---" * 9 + "|")
     for row in rows:
         rms = " | ".join(f"{_MM * value:.4f}" for value in row.rms_m)
         false = ", ".join(f"{100 * share:.2f} %" for share in row.false)
-        print(f"| {row.name} | {rms} | {false} | {row.beside[0]:.2f}, ", end="")
-        print(f"{row.beside[1]:.2f} |")
-    for words, select in (("any point", 0), (f"points within {_MM * RIGHT_M:g} mm", 1)):
-        print(f"\nCompleteness at half / one / two gaps [%], by {words}.\n")
-        print("| object | albedo | all points | before | now |")
-        print("|---|---|---|---|---|")
+        beside = ", ".join(f"{value:.2f}" for value in row.beside)
+        print(f"| {row.name} | {rms} | {false} | {beside} |")
+    right = f"by points within {_SIGMAS:g} sigma of where their pixels look, put there"
+    for words, select in (("by any point", 0), (right, 1)):
+        print(f"\nCompleteness at half / one / two gaps [%], {words}.\n")
+        print("| object | albedo | all points | before | now | lost, won of samples |")
+        print("|---|---|---|---|---|---|")
         for row in rows:
+            *kinds, (lost, won) = row.right if select else row.complete
             cells = " | ".join(
-                " / ".join(f"{100 * share:.2f}" for share in shares)
-                for shares in (row.right if select else row.complete)
+                " / ".join(f"{100 * share:.2f}" for share in shares) for shares in kinds
             )
-            print(f"| {row.name} | {cells} |")
+            counts = f"{lost:.0f}, {won:.0f} of {row.n_samples}"
+            print(f"| {row.name} | {cells} | {counts} |")
     print("\nShares of all points [%].\n")
     print("| object | albedo | in the light of two | redundant | false at steps |")
     print("|---|---|---|---|---|")
