@@ -11,7 +11,9 @@ same candidates.
 - Drops, turns: the paper's route as it was up to commit OLD, from rings of the closed
   forms: cameras dropped only; holes closed by turns of 3, 8 and 18 degrees and moves to
   the limit (10), too. Its code is taken from the history into a temporary folder.
-- Program: the route as it is. Without (10): the same with no seam in its programs.
+- Program: the route as it is. It stops because the bound over all poses says that no
+  fewer are enough, or with so many samples of those required that the best of one
+  fewer were found to measure. Without (10): the same with no seam in its programs.
 - Cover: the fewest candidates, and with poses at the limit (10) of its own cameras
   among them, as up to OLD. Least: what is proved over candidates, and over all poses.
 - Closed form, axes square to the surface: floor(f L / 2C) + 1 of a wall, floor(f pi /
@@ -65,6 +67,7 @@ _HEAD = (
     "drops",
     "turns",
     "program",
+    "stops",
     "without (10)",
     "cover",
     "with poses at (10)",
@@ -97,6 +100,7 @@ _SHAPES: dict[str, Callable[[], TriangleMesh]] = {
 _OVERFLOWING: dict[str, Callable[[], TriangleMesh]] = {
     "row of a wall": lambda: plain_shapes.grid(0.6, 0.1, divisions=(60, 10)),
     "wall": lambda: plain_shapes.grid(0.4, 0.3, divisions=(40, 30)),
+    "pipe": lambda: plain_shapes.cylinder(0.05, 0.5, capped=False),
     "tube": lambda: plain_shapes.cylinder(0.15, 0.1, capped=False),
     "large ball": lambda: sphere(0.15, subdivisions=4),
 }
@@ -153,12 +157,13 @@ def _row(name: str, tree: Path) -> tuple[list[str], bool]:
     )
     before = _before(name, tree, seen)
     assert before["measured"] == int(case.measured.sum()), "the old tree sees another"
-    by_program, seconds = _timed(lambda: _by_program(case))
+    (by_program, stops), seconds = _timed(lambda: _by_program(case))
     cover, least, cover_seconds = _by_cover(case)
     everywhere, bound_seconds = _timed(lambda: _bound(case, cover))
     spent = [*before["seconds"], seconds, cover_seconds, bound_seconds]
-    counts = [before["drops"], before["turns"], by_program, _without_seams(case), cover]
-    cells = [name, str(len(case.projectors)), *map(_count, counts)]
+    counts = [before["drops"], before["turns"], by_program]
+    cells = [name, str(len(case.projectors)), *map(_count, counts), stops]
+    cells += [_count(_without_seams(case)), str(cover)]
     cells += [_count(before["limit"]), _closed_form(name, case), str(least)]
     cells += [str(everywhere), " / ".join(f"{s:.1f}" for s in spent)]
     return cells, (by_program or 99) <= (before["turns"] or 99)
@@ -208,8 +213,8 @@ def _case(rig: Rig, ready: Prepared, projectors: tuple[PlannedProjector, ...]) -
     return Case(rig, scene, projectors, views, samples, measured)
 
 
-def _by_program(case: Case) -> int | None:
-    """Cameras of the paper's route as it is; None: it ended short."""
+def _by_program(case: Case) -> tuple[int | None, str]:
+    """Cameras of the paper's route as it is, None if short, and why it stops."""
     from planning.cameras.camera_cover import candidate_cover
     from planning.cameras.paper.paper_cameras import route_problem
     from planning.cameras.paper.paper_route import paper_route
@@ -218,7 +223,9 @@ def _by_program(case: Case) -> int | None:
     cover = candidate_cover(case.scene, case.measured, case.samples)
     problem = route_problem(on, case.candidates, cover)
     route = paper_route(problem)
-    return None if problem.short(route.cameras) else len(route.cameras.cameras)
+    why = f"{route.best_without_one} of {cover.required}"
+    count = None if problem.short(route.cameras) else len(route.cameras.cameras)
+    return count, "bound" if route.bounded else why
 
 
 def _without_seams(case: Case) -> int | None:
@@ -228,7 +235,7 @@ def _without_seams(case: Case) -> int | None:
     ends = HoleTerms.ends
     HoleTerms.ends = lambda *_: iter(())
     try:
-        return _by_program(case)
+        return _by_program(case)[0]
     finally:
         HoleTerms.ends = ends
 

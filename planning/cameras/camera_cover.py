@@ -52,6 +52,7 @@ class CameraCover:
         interference: The candidates among each other's bodies, where they have any.
         by_count: Candidates for each number of them, where the paper's route passed
             them; None: the best there are.
+        stopped: Why the paper's route has no camera fewer.
     """
 
     candidates: CandidateViews
@@ -60,6 +61,7 @@ class CameraCover:
     selection: Selection
     interference: Interference | None = None
     by_count: Mapping[int, NDArray[np.int64]] | None = None
+    stopped: str = ""
 
     @property
     def cameras(self) -> tuple[PlannedCamera, ...]:

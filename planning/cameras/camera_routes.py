@@ -85,11 +85,13 @@ def better_route(
     Also as many cameras of the paper's route, where the cover's stay.
     """
     if by == "paper":
+        why = "proved to be the fewest of the candidates and its own cameras"
         if cover.selection.lower_bound < cover.selection.needed:
             # Other axes may let the route end with fewer.
             again = cover_by_paper(scene, projectors, cover.candidates)
             cover = min(cover, again, key=lambda one: one.selection.needed)
-        return cover, _counts(by, cover, "the paper's route was asked for"), ()
+            why = again.stopped or "no fewer were found"
+        return cover, _counts(by, cover, why), ()
     route: RouteCameras | None = None
     why = "the cover was asked for"
     if by == "both":

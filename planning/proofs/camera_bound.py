@@ -35,6 +35,8 @@ from .all_poses import BoundQuestion, ContinuousBound, Effort
 DEFAULT = Effort(
     finest=7, aims=None, maps=5, budget=1.5e9, shadows=3e8, most_samples=2000
 )
+# Of what is asked only to spare a search: rough cells, no shadows.
+ROUGH = replace(DEFAULT, shadows=0.0, budget=3e8)
 PROVE = Effort(finest=8, aims=5, maps=7, budget=1e10, shadows=np.inf)
 
 
@@ -64,6 +66,14 @@ def bound_cameras(
             best, shadows = better, among_shadows
     shadows = shadows or best.status is CellStatus.PROVED
     return ContinuousBound(question, best, shadows, np.empty((0, 3)))
+
+
+def rough_bound(
+    scene: Scene, device: PinholeModel, samples: LitSamples, question: BoundQuestion
+) -> int:
+    """Return what the roughest cells prove, which costs least."""
+    tree, _ = next(camera_trees(scene, device, samples, ROUGH))
+    return int(question.searched(tree, ROUGH.budget).lower_bound)
 
 
 def camera_trees(

@@ -309,9 +309,9 @@ def test_the_summary_tells_both_counts_and_why(handmade):
     assert re.search(
         r"3 by the cover, 4 by the paper.*taken the cover.*fewer; so", line
     )
-    told = RouteCounts(asked="paper", cover=None, paper=4, taken="paper", why="")
+    told = RouteCounts(asked="paper", cover=None, paper=4, taken="paper", why="so many")
     (alone,) = route_lines(proof.changed(routes=told))
-    assert alone.endswith("4 by the paper's largest baselines")
+    assert alone.endswith("4 by the paper's largest baselines; so many")
     assert route_lines(proof) == []
 
 

@@ -26,6 +26,8 @@ from planning.cameras.camera_cover import (
 )
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.proofs.all_poses import BoundQuestion
+from planning.proofs.camera_bound import rough_bound
 from planning.proofs.selection import CandidateCover, Selection
 from planning.scene.camera_views import CandidateViews
 from planning.scene.draws import DRAWS
@@ -55,6 +57,7 @@ class RouteCameras:
         needed: Cameras with which it measures what is required; None: it ended short.
         best_without_one: Share of what is reachable that the best of one fewer
             measure.
+        bounded: Whether none was tried, since fewer can't be enough anywhere.
     """
 
     candidates: CandidateViews
@@ -62,6 +65,17 @@ class RouteCameras:
     by_count: Mapping[int, NDArray[np.int64]]
     needed: int | None
     best_without_one: float
+    bounded: bool = False
+
+    @property
+    def stopped(self) -> str:
+        """Why it has no camera fewer."""
+        if self.bounded:
+            return "fewer can't be enough, wherever they stand"
+        if not self.best_without_one:
+            return ""
+        share = np.floor(1e3 * self.best_without_one) / 10.0
+        return f"with one fewer {share:.1f} % of what is reachable was measured at most"
 
     @property
     def best(self) -> int:
@@ -154,6 +168,7 @@ def route_among(
         by_count,
         least=len(route.cameras.cameras),
         without=route.best_without_one / max(1, int(reachable.sum())),
+        bounded=route.bounded,
     )
 
 
@@ -166,6 +181,7 @@ def _judged(
     *,
     least: int,
     without: float,
+    bounded: bool = False,
 ) -> RouteCameras:
     """Say with how many of its cameras, at least so many, the route is enough."""
     cover = candidate_cover(scene, measured, samples)
@@ -174,7 +190,10 @@ def _judged(
         for n, chosen in sorted(by_count.items())
         if n >= least and cover.enough(chosen)
     )
-    return RouteCameras(candidates, measured, by_count, next(enough, None), without)
+    needed = next(enough, None)
+    # More samples may ask for more cameras than those that it was bounded on.
+    bounded = bounded and needed == least
+    return RouteCameras(candidates, measured, by_count, needed, without, bounded)
 
 
 def route_problem(
@@ -193,6 +212,16 @@ def route_problem(
             on, cameras, max_evaluations=_EVALUATIONS, max_programs=_PROGRAMS
         )
 
+    free = np.asarray(cover.covers[:, :n].any(axis=1))
+    required = max(0, cover.quotas.total - int(free.sum()))
+    wanted = taken(on.lit, np.flatnonzero(~free), on.lit.lit)
+
+    def least(count: int) -> int:
+        if not required:
+            return n
+        question = BoundQuestion(required, count - n, len(free), 1.0)
+        return n + rough_bound(scene, candidates.cameras[0].device, wanted, question)
+
     return RouteProblem(
         on.surface,
         baseline_limits(scene),
@@ -202,6 +231,7 @@ def route_problem(
         widen,
         cover.quotas,
         lambda count: cover.most_covering(count, None, _BEST)[0],
+        least,
         n,
         on.rings,
     )
@@ -246,6 +276,7 @@ def cover_of(
         _selection(scene, samples, route),
         among,
         route.by_count,
+        route.stopped,
     )
 
 

@@ -2,7 +2,8 @@
 
 1. Start: of the cameras offered always the one that measures most of what none does.
 2. A camera goes. Where its part was, (10) is violated; the others close the hole, their
-   baselines out to d_max as far as that takes. Again, while they can.
+   baselines out to d_max as far as that takes. Again, while they can, and until the
+   bound over all poses says that no fewer are enough.
 3. The baselines of those that are left are maximised.
 
 Source: Lee and Krim, 2014, section VI; `docs/method/baselines.md`, *The two routes*.
@@ -30,19 +31,26 @@ class PaperRoute:
         by_count: Cameras for 1, 2, ... of them, on the way and beyond; those of the
             final count at their largest baselines.
         best_without_one: Most samples that one camera fewer was seen to measure.
+        bounded: Whether none was tried, since fewer can't be enough anywhere.
     """
 
     cameras: CameraSet
     by_count: dict[int, Cameras]
     best_without_one: int
+    bounded: bool
 
 
 def paper_route(problem: RouteProblem) -> PaperRoute:
     """Plan cameras by the largest baselines alone; where short, as many as help."""
     by_count: dict[int, Cameras] = {}
-    placed, best_without_one = _grown(problem), 0
+    placed, best_without_one, bounded = _grown(problem), 0, False
     while len(placed.cameras) > problem.n_fixed:
-        by_count[len(placed.cameras)] = placed.cameras
+        count = len(placed.cameras)
+        by_count[count] = placed.cameras
+        bounded = not problem.short(placed) and problem.least(count) >= count
+        if bounded:
+            best_without_one = 0
+            break
         fewer = one_fewer(problem, placed)
         best_without_one = 0 if fewer is None else fewer.count
         if fewer is None or problem.short(fewer) > problem.short(placed):
@@ -56,7 +64,7 @@ def paper_route(problem: RouteProblem) -> PaperRoute:
     by_count[len(placed.cameras)] = placed.cameras
     _fill(problem, placed, by_count)
     by_count.pop(0, None)
-    return PaperRoute(placed, by_count, best_without_one)
+    return PaperRoute(placed, by_count, best_without_one, bounded)
 
 
 def _grown(problem: RouteProblem) -> CameraSet:

@@ -31,6 +31,8 @@ class RouteProblem:
         quotas: What must be measured, of all samples and of regions.
         best: As many of the offered cameras that measure most, as far as counted work
             goes; their indices.
+        least: Of a number of cameras that are enough, how many are needed at least,
+            wherever they stand.
         n_fixed: Existing cameras.
         rings: Rings of each projector on the samples; None: no rings.
     """
@@ -43,6 +45,7 @@ class RouteProblem:
     widen: Callable[[Sequence[PlannedCamera]], WidestBaselines]
     quotas: Quotas
     best: Callable[[int], NDArray[np.int64]]
+    least: Callable[[int], int]
     n_fixed: int = 0
     rings: RingsOnSurface | None = None
 

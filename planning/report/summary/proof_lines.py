@@ -54,7 +54,7 @@ def route_lines(proof: Certificate) -> list[str]:
     ]
     line = f"ROUTES   cameras: {', '.join(counts)}"
     if routes.asked != "both":
-        return [line]
+        return [f"{line}; {routes.why}" if routes.asked == "paper" else line]
     return [f"{line}; taken {names[routes.taken]}: {routes.why}"]
 
 
