@@ -789,8 +789,11 @@ def clean_images(job: Job, bits: int, blur_m: float) -> InMemory:
     return InMemory(Path("x"), scanner, stacks)
 
 
-@pytest.mark.parametrize("blur_m", [0.0, 2.5e-4, 1e-3])
-@pytest.mark.parametrize("bits", [LOW_NOISE, 8, 10, 12, 16])
+@pytest.mark.parametrize(
+    ("bits", "blur_m"),
+    [(bits, blur) for bits in (LOW_NOISE, 8, 12) for blur in (0.0, 1e-3)]
+    + [(8, 2.5e-4), (10, 2.5e-4), (16, 2.5e-4)],
+)
 def test_clean_images_are_not_suspicious(lit_job, bits, blur_m):
     """Black may equal a root disc that is out of sight; nothing is too clean."""
     images = clean_images(lit_job, bits, blur_m)
