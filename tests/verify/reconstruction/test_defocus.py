@@ -93,7 +93,7 @@ def test_edges_off_the_plane_in_focus_are_as_wide_as_the_disc_makes_them(rigs, f
         albedo_variation=0.0,
         projector_blur_m=float(np.hypot(0.25e-3, 0.5e-3)),
     )
-    assert blurred == pytest.approx(frames(wide, None), abs=0.01)
+    assert np.abs(blurred - frames(wide, None)).max() < 0.01
     assert np.abs(blurred - frames(CLEAN, None)).max() > 10.0
 
 
