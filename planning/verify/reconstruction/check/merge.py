@@ -145,9 +145,11 @@ def _sure(cell: Array, source: Indices, sigma: Array, ratio: float) -> Mask:
     """Which points are of the best one's source in their cell, or about as sure."""
     # Without a normal a point gives way to any other.
     known = np.where(np.isfinite(sigma), sigma, np.inf)
-    order = np.lexsort((known, cell))
-    first = np.flatnonzero(np.diff(cell[order], prepend=-1.0))
-    best = np.empty_like(order)
-    best[order] = np.repeat(order[first], np.diff(first, append=len(order)))
-    good = source == source[best]
-    return good | ((ratio > 1.0) & (known <= ratio * known[best]))
+    _, place = np.unique(cell, return_inverse=True)
+    least = np.full(place.max() + 1, np.inf)
+    np.minimum.at(least, place, known)
+    best = np.flatnonzero(known == least[place])[::-1]
+    best_source = np.empty(len(least), dtype=source.dtype)
+    best_source[place[best]] = source[best]
+    good = source == best_source[place]
+    return good | ((ratio > 1.0) & (known <= ratio * least[place]))

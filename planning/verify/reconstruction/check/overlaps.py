@@ -63,7 +63,8 @@ def pixel_sizes(cloud: Cloud, plan: Scanner) -> Array:
     """Return how large a pixel is at each point, across the viewing ray [m], (n,)."""
     centres = np.array([camera.centre for camera in plan.cameras])
     focal = np.array([camera.focal_px for camera in plan.cameras])
-    reach = np.linalg.norm(cloud.points - centres[cloud.camera], axis=1)
+    away = cloud.points - centres[cloud.camera]
+    reach = np.sqrt(np.einsum("ij,ij->i", away, away))
     return reach / focal[cloud.camera]
 
 
