@@ -177,11 +177,11 @@ def certified(case, plan) -> list[str]:
     [
         ({"floors": 1}, "certificates.projectors.floors: claimed 1"),
         ({"floors": 0}, "certificates.projectors.floors: claimed 0"),
-        ({"for_total": 2}, "for_total: 2 is claimed without floors, but only 1 with"),
+        ({"for_total": 2}, "for_total: 2 is claimed without floors, but 1 by"),
         ({"for_total": None}, "for_total: None is claimed beside 1, but 2 regions"),
         (
             {"for_total": 0, "by_count": ROW_OF_NONE},
-            "for_total: 0 is claimed, but by_count says that 0 cover too little",
+            "for_total: 0 is claimed without floors, but 1 by by_count",
         ),
     ],
 )

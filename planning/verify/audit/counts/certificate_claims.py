@@ -94,16 +94,12 @@ def _audit_floors(kind: DeviceKind, case: AuditCase, findings: AuditFindings) ->
     most = max(least, claims.needed.lower_bound)
     required = claims.required_m2 * (1.0 - ROUNDING)
     few = [row.count for row in claims.by_count if row.upper_bound_m2 < required]
+    fewest = min(1 + max(few, default=0), most)
     findings.holds(
-        total <= most,
+        fewest <= total <= most,
         "candidates.for_total",
-        f"{total} is claimed without floors, but only {least} with them",
-    )
-    findings.holds(
-        total >= min(1 + max(few, default=0), most),
-        "candidates.for_total",
-        f"{total} is claimed, but by_count says that {max(few, default=0)} cover too "
-        f"little",
+        f"{total} is claimed without floors, but {fewest} by by_count and only {most} "
+        f"with them",
     )
 
 
