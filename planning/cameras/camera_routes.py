@@ -237,10 +237,7 @@ def _compared(
         why = f"with the {paper} of the paper's route fresh samples fall short"
         paper = None
     elif paper > kept:
-        why = (
-            f"fewer; without one of its {paper} the paper's route was found to measure "
-            f"{_percent(route.best_without_one)} of what is reachable, {required}"
-        )
+        why = f"fewer; of the {paper} by the paper's route: {route.stopped}, {required}"
     return RouteCounts(asked="both", cover=kept, paper=paper, taken=taken, why=why)
 
 

@@ -274,13 +274,17 @@ def test_a_camera_that_gains_at_the_end_of_its_part_closes_the_hole_alone():
     assert nearer < 0.98 * limit.d_max
 
 
-def test_elastic_cameras_roll_to_what_a_wide_image_holds():
-    """A strip square to the image's long side, which the camera can only turn to."""
-    centre, side = np.array([[RING, 0.0, 0.0]]), np.array([0.2, 0.05])
-    points = [[RADIUS, 0.0, z] for z in (-0.1, 0.1)]
+@pytest.mark.parametrize(("from_", "up"), [((1.0, 0, 0), Z), (Z, (0, 1.0, 0))])
+def test_elastic_cameras_roll_to_what_a_wide_image_holds(from_, up):
+    """A strip square to the image's long side, which the camera can only turn to.
+
+    Seen from above the shell's up is no up.
+    """
+    from_, up, side = np.array(from_), np.array(up), np.array([0.2, 0.05])
     problem = _problem(
-        centre,
-        kept=_kept([0, 0], points, [[1.0, 0.0, 0.0]] * 2),
+        RING * from_[None],
+        kept=_kept([0, 0], [RADIUS * from_ + z * up for z in (-0.1, 0.1)], [from_] * 2),
+        ups=up[None],
         sides=np.array([-side, side]),
         pairs=np.zeros((0, 2), dtype=np.int64),
         weights=np.ones(2),
