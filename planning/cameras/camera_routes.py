@@ -118,6 +118,7 @@ def _counts(by: CamerasBy, cover: CameraCover, why: str) -> RouteCounts:
         return RouteCounts(asked=by, cover=needed, paper=None, taken="cover", why=why)
     met = cover.selection.status != "infeasible"
     count = needed if met or needed > len(cover.cameras) else None
+    why = "it ended with less than is asked" if count is None else why
     return RouteCounts(asked=by, cover=None, paper=count, taken="paper", why=why)
 
 

@@ -139,7 +139,11 @@ def follow_cameras(
         scene = scene.among(projectors)
         cover = cover_again(scene, moved, stage.cover, by)
         if proves_as_much(cover.selection, stage.certificate, len(cameras)):
-            proved = camera_stage(scene, cover, stage.routes)
+            # Where fewer are allowed than are needed, other axes may need another count
+            # than the routes did.
+            needed = stage.certificate.needed.count
+            as_told = cover.selection.needed == needed
+            proved = camera_stage(scene, cover, stage.routes if as_told else None)
             return CameraSolution(moved, proved)
     return CameraSolution(tuple(projectors), stage)
 

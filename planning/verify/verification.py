@@ -198,7 +198,7 @@ def _reconstruct(
         seed=seed,
         threads=threads,
         truth=standing,
-        expected=Expected(samples, case.actual.measured),
+        expected=Expected(samples, case.actual.measured, case.actual.by_pair),
         progress=countdown(
             lambda line: say(f"pixels: {line}"),
             n_cameras=len(believed.cameras),

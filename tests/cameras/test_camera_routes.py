@@ -27,7 +27,11 @@ from planning.cameras.camera_routes import (
     cover_by_cover,
     widest_routes,
 )
-from planning.cameras.paper.paper_cameras import cover_by_paper, route_among
+from planning.cameras.paper.paper_cameras import (
+    RouteCameras,
+    cover_by_paper,
+    route_among,
+)
 from planning.cameras.proved_cameras import camera_stage
 from planning.model.bodies import Body
 from planning.model.document.certificates import Certificate, RouteCounts
@@ -159,6 +163,21 @@ def test_too_few_allowed_are_the_best_of_the_route_and_say_what_is_needed(ball):
     assert (len(cover.cameras), cover.selection.needed) == (2, 3)
     _, routes, _ = better_route(few, projectors, cover, "paper")
     assert (routes.paper, routes.taken) == (3, "paper")
+
+
+def test_a_route_that_ends_short_is_not_proved_to_be_the_fewest(ball, fine):
+    """Nothing bounds how many are allowed, and all that it has aren't enough."""
+    scene, projectors, _ = ball
+    cover = fine[0]
+    short = replace(cover, selection=replace(cover.selection, status="infeasible"))
+    _, routes, _ = better_route(scene, projectors, short, "paper")
+    assert (routes.paper, routes.why) == (None, "it ended with less than is asked")
+
+
+def test_where_the_bound_stops_the_route_is_said_of_its_own_samples(fine):
+    cover = fine[0]
+    route = RouteCameras(cover.candidates, cover.measured, {}, 3, 0.0, bounded_on=400)
+    assert "of its 400 samples" in route.stopped
 
 
 def test_bodies_of_the_routes_cameras_keep_off_each_other(ball):

@@ -23,6 +23,7 @@ from planning.cameras.camera_stage import (
     with_cameras,
 )
 from planning.cameras.proved_cameras import camera_stage
+from planning.model.document.certificates import RouteCounts
 from planning.rig.rig import load_rig
 from planning.rings.axis_moves import (
     AxisJudge,
@@ -301,7 +302,10 @@ def test_what_cameras_see_bounds_what_any_axes_need(ball):
 def test_the_proof_is_of_the_axes_that_are_kept(ball, moved):
     scene, projectors, cover = ball
     stage = camera_stage(scene, cover)
+    told = RouteCounts(asked="cover", cover=2, paper=None, taken="cover", why="so")
+    stage = replace(stage, routes=told)
     followed = follow_cameras(scene, projectors, cover.cameras, stage)
+    assert followed.stage.routes is told
     for new, expected in zip(followed.projectors, moved, strict=True):
         assert np.array_equal(new.world_from_ring, expected.world_from_ring)
     samples = followed.stage.cover.samples
@@ -311,6 +315,13 @@ def test_the_proof_is_of_the_axes_that_are_kept(ball, moved):
         assert np.array_equal(own.normals, rings.normals)
     count = len(cover.cameras)
     assert followed.stage.certificate.count == count
+    # More are needed than under the axes before: what routes need isn't told anew.
+    proof = stage.certificate
+    other = proof.changed(needed=proof.needed.changed(count=proof.needed.count + 1))
+    other = replace(stage, certificate=other)
+    followed = follow_cameras(scene, projectors, cover.cameras, other)
+    assert followed.stage is not other
+    assert followed.stage.routes is None
     # Another number of cameras than is proved: axes and proof stay.
     more = follow_cameras(scene, projectors, (*cover.cameras, cover.cameras[0]), stage)
     assert more.stage is stage

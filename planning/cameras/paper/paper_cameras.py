@@ -57,7 +57,8 @@ class RouteCameras:
         needed: Cameras with which it measures what is required; None: it ended short.
         best_without_one: Share of what is reachable that the best of one fewer
             measure.
-        bounded: Whether none was tried, since fewer can't be enough anywhere.
+        bounded_on: Samples of which fewer can't be enough anywhere, so that none was
+            tried; 0 where that isn't so.
     """
 
     candidates: CandidateViews
@@ -65,13 +66,16 @@ class RouteCameras:
     by_count: Mapping[int, NDArray[np.int64]]
     needed: int | None
     best_without_one: float
-    bounded: bool = False
+    bounded_on: int = 0
 
     @property
     def stopped(self) -> str:
         """Why it has no camera fewer."""
-        if self.bounded:
-            return "fewer can't be enough, wherever they stand"
+        if self.bounded_on:
+            return (
+                f"fewer can't be enough of its {self.bounded_on} samples, wherever "
+                "they stand"
+            )
         if not self.best_without_one:
             return ""
         share = np.floor(1e3 * self.best_without_one) / 10.0
@@ -168,7 +172,7 @@ def route_among(
         by_count,
         least=len(route.cameras.cameras),
         without=route.best_without_one / max(1, int(reachable.sum())),
-        bounded=route.bounded,
+        bounded_on=len(some) if route.bounded else 0,
     )
 
 
@@ -181,7 +185,7 @@ def _judged(
     *,
     least: int,
     without: float,
-    bounded: bool = False,
+    bounded_on: int = 0,
 ) -> RouteCameras:
     """Say with how many of its cameras, at least so many, the route is enough."""
     cover = candidate_cover(scene, measured, samples)
@@ -192,8 +196,8 @@ def _judged(
     )
     needed = next(enough, None)
     # More samples may ask for more cameras than those that it was bounded on.
-    bounded = bounded and needed == least
-    return RouteCameras(candidates, measured, by_count, needed, without, bounded)
+    bounded_on = bounded_on if needed == least else 0
+    return RouteCameras(candidates, measured, by_count, needed, without, bounded_on)
 
 
 def route_problem(

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from planning.verify.reconstruction.check.accuracy import Expected
 from planning.verify.reconstruction.check.result import PairCount
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.decode.decode import CAUSES, Decoded
+from planning.verify.reconstruction.faults.causes import _dark
 from planning.verify.reconstruction.faults.inaccurate import wrong_roots
 from planning.verify.reconstruction.faults.measured_clouds import rejection
 from planning.verify.reconstruction.faults.supposed import Supposed
@@ -52,6 +54,23 @@ def said_once(words: str, failures: tuple[str, ...]) -> bool:
     again = [text for text in others if text.endswith("; likely as above")]
     repeated = [text for text in others if re.search(words, text)]
     return bool(re.search(words, first)) and again == others and not repeated
+
+
+@pytest.mark.parametrize("promised", [0.0, 0.1])
+def test_a_device_that_was_to_measure_nothing_is_not_called_dark(plan, promised):
+    """P2 gave no edge; by the plan no camera was to see its light."""
+    shares = np.array([[0.5, 0.5, 0.5], [promised, 0.0, 0.0]])
+    expected = Expected(sample_surface(plan.surface.mesh, 10, seed=0), None, shares)
+    counts = tuple(
+        PairCount(p, c, 2000, 1000 if p == "P1" else 0, 900, {})
+        for p in ("P1", "P2")
+        for c in ("C1", "C2", "C3")
+    )
+    measured = SimpleNamespace(plan=plan, counts=counts, expected=expected)
+    told = ["P2 is dark: no camera saw its light; off, covered, blocked or aimed"]
+    assert [w.removesuffix(" elsewhere") for w in _dark(measured)] == told * (
+        promised > 0.0
+    )
 
 
 def test_two_projectors_on_at_once_are_named(plan, claims):

@@ -1,5 +1,7 @@
 """What the errors of a reconstruction point at, in words."""
 
+import numpy as np
+
 from .cause_words import in_words
 from .diagnosis import diagnose
 from .inaccurate import where_inaccurate, wrong_roots
@@ -58,14 +60,18 @@ def _dark(measured: MeasuredClouds) -> list[str]:
         ("camera", measured.plan.cameras, "it saw no light"),
     )
     words: list[str] = []
-    for role, devices, dark in roles:
+    for axis, (role, devices, dark) in enumerate(roles):
         pairs = {
             device.id: [p for p in measured.counts if getattr(p, role) == device.id]
             for device in devices
         }
         n_edges = {name: sum(p.n_edges for p in each) for name, each in pairs.items()}
         few = _DARK_SHARE * max(n_edges.values(), default=0)
-        for name, each in pairs.items():
+        promised = measured.expected.by_pair
+        for k, (name, each) in enumerate(pairs.items()):
+            if promised is not None and not np.any(np.take(promised, k, axis)):
+                # No pair of it was to measure anything, so that it shows no fault.
+                continue
             if n_edges[name] <= few:
                 why = "off, covered, blocked or aimed elsewhere"
                 words.append(f"{name} is dark: {dark}; {why}")
