@@ -466,6 +466,7 @@ def test_too_few_cameras_say_why_how_many_and_which_limit(handmade):
         "count": 1,
         "needed": {"count": 3, "lower_bound": 2, "relaxations": ["a = 2 (now 1)"]},
     }
+    document["certificates"]["cameras"]["candidates"]["for_total"] = 2
     document["coverage"]["uncovered_by_cause"] = {
         "projector_beam": 9e-4,
         "sigma": 2e-4,

@@ -5,7 +5,7 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from solvers.poses.cone import max_margin_direction
@@ -72,6 +72,8 @@ def test_normals_without_a_common_half_space_have_no_direction(normals):
     n=st.integers(1, 300),
     half_angle=st.sampled_from([0.05, 0.6, 1.2, 1.5]),
 )
+# The solver calls its answer inaccurate, and it isn't.
+@example(seed=1984409, n=257, half_angle=0.05)
 def test_multipliers_prove_that_no_direction_is_better(seed, n, half_angle):
     """With a >= 0 of sum 1, min_i -N_i.L <= -(sum a_i N_i).L <= |sum a_i N_i|."""
     normals = cap(seed, n, half_angle)
