@@ -117,7 +117,10 @@ def _counts(by: CamerasBy, cover: CameraCover, why: str) -> RouteCounts:
     if by != "paper":
         return RouteCounts(asked=by, cover=needed, paper=None, taken="cover", why=why)
     met = cover.selection.status != "infeasible"
-    count = needed if met or needed > len(cover.cameras) else None
+    # Where fewer are allowed, those that suffice are the route's, or of a cover.
+    own = (cover.by_count or {}).get(needed, np.empty(0, dtype=np.int64))
+    enough = needed > len(cover.cameras) and np.isin(cover.selection.smallest, own)
+    count = needed if met or np.all(enough) else None
     why = "it ended with less than is asked" if count is None else why
     return RouteCounts(asked=by, cover=None, paper=count, taken="paper", why=why)
 

@@ -18,7 +18,7 @@ from geometry.shapes.primitives import sphere
 from planning import RigPlan
 from planning.cameras.baselines.widest_baselines import WidestBaselines
 from planning.cameras.camera_baselines import baseline_samples, held_to_candidates
-from planning.cameras.camera_cover import camera_candidate_views
+from planning.cameras.camera_cover import camera_candidate_views, candidate_cover
 from planning.cameras.camera_routes import (
     _clearly_wider,
     _loses,
@@ -30,6 +30,7 @@ from planning.cameras.camera_routes import (
 from planning.cameras.paper.paper_cameras import (
     RouteCameras,
     cover_by_paper,
+    cover_of,
     route_among,
 )
 from planning.cameras.proved_cameras import camera_stage
@@ -172,6 +173,23 @@ def test_a_route_that_ends_short_is_not_proved_to_be_the_fewest(ball, fine):
     short = replace(cover, selection=replace(cover.selection, status="infeasible"))
     _, routes, _ = better_route(scene, projectors, short, "paper")
     assert (routes.paper, routes.why) == (None, "it ended with less than is asked")
+
+
+def test_as_many_as_are_said_to_suffice_do_where_the_route_ended_short(ball, fine):
+    """One camera is allowed; two of the route aren't enough, three candidates are."""
+    scene, projectors, _ = ball
+    cover = fine[0]
+    few = replace(scene, requirements=replace(scene.requirements, max_cameras=1))
+    passed = {n: cover.selection.chosen[:n] for n in (1, 2)}
+    route = RouteCameras(cover.candidates, cover.measured, passed, None, 0.9)
+    short = cover_of(few, projectors, cover.samples, route)
+    assert len(short.cameras) == 1
+    required = candidate_cover(few, cover.measured, cover.samples)
+    assert required.enough(short.selection.smallest)
+    proof = camera_stage(few, short).certificate
+    assert proof.needed.count == len(short.selection.smallest) == 3
+    _, routes, _ = better_route(few, projectors, short, "paper")
+    assert routes.paper is None
 
 
 def test_where_the_bound_stops_the_route_is_said_of_its_own_samples(fine):

@@ -287,16 +287,21 @@ def cover_of(
 def _selection(scene: Scene, samples: LitSamples, route: RouteCameras) -> Selection:
     cover = candidate_cover(scene, route.measured, samples)
     bound = solve_cover(cover.problem, seed=scene.seed, heaviest=False)
-    needed = route.best
+    allowed = min(route.best, cover.max_count or route.best)
+    chosen = smallest = route.by_count[allowed]
+    # A route that ended short shows no number that is enough; a cover does.
+    if route.needed is not None:
+        smallest = route.by_count[route.needed]
+    elif len(bound.selected) > allowed:
+        smallest = np.asarray(bound.selected, dtype=np.int64)
+    needed = len(smallest)
     least = min(int(np.ceil(bound.lower_bound - 1e-9)), needed)
-    allowed = min(needed, cover.max_count or needed)
-    chosen = route.by_count[allowed]
     _, most = cover.most_covering(allowed, None)
     met = route.needed is not None and allowed == needed
     proved = "optimal" if least >= needed else "feasible"
     return Selection(
         chosen,
-        route.by_count[needed],
+        smallest,
         least,
         proved if met else "infeasible",
         bound.proof,
