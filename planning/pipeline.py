@@ -21,7 +21,7 @@ from planning.report.summary.shortfall import shortfalls
 from planning.rig.lens_fit import check_fields
 from planning.rig.mounted import Mounted
 from planning.rig.rig import Rig
-from planning.rig.wishes import TargetName, Wishes
+from planning.rig.wishes import AccuracyOf, TargetName, Wishes
 from planning.scene.interest import Select, Weight
 from planning.scene.ranges.ranged_body import RangedBody
 from planning.verify.verification import verify_plan
@@ -57,6 +57,7 @@ def plan_rig(
     min_reachable: float | None = None,
     region_coverage: float | None = None,
     accuracy_mm: float | None = None,
+    accuracy_of: AccuracyOf = "total",
     up: str | None = None,
     ring_axis: RingAxis | None = None,
     seed: int = 0,
@@ -93,6 +94,8 @@ def plan_rig(
         region_coverage: Floor of each dominant region, lit / reachable by projectors
             and measured / reachable by cameras, 0 for none; None: the rig's.
         accuracy_mm: Largest standard deviation along the normal [mm]; None: the rig's.
+        accuracy_of: Whether that is of the `total`, with what the rig says that its
+            calibration leaves, or of `noise` alone.
         up: Axis that points up, `z` or `-y` and so on; None: the rig's.
         ring_axis: Rings `centred` on what each projector lights, with axes `free` to
             stand where errors are smallest, or `auto`: centred where that takes no
@@ -132,6 +135,7 @@ def plan_rig(
         min_reachable=min_reachable,
         region_coverage=region_coverage,
         accuracy_mm=accuracy_mm,
+        accuracy_of=accuracy_of,
         up=up,
         ring_axis=ring_axis,
     )

@@ -18,6 +18,7 @@ from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.quotas import Quotas, RegionFloors
 from planning.scene.bodies.clearance import lacks_clearance
 from planning.scene.draws import DRAWS
+from planning.scene.limits.calibration_terms import surface_deviation
 from planning.scene.measured import LitSamples, lit_samples, measured_by
 from planning.scene.placed_bodies import moves_bodies
 from planning.scene.scene import Scene
@@ -55,14 +56,20 @@ class BaselineSamples:
     @cached_property
     def rings(self) -> RingsOnSurface:
         """The rings of every projector on the samples."""
-        noise = self.scene.requirements.triangulation.noise_px
+        limits = self.scene.requirements.triangulation
+        levers = np.stack([rings.levers for rings in self.lit.surfaces])
+        placed = surface_deviation(limits.limited_calibration, levers)
         return RingsOnSurface(
             np.stack([rings.normals for rings in self.lit.surfaces]),
             np.stack([rings.spacing for rings in self.lit.surfaces]),
             np.stack(
-                [noise / np.maximum(x.incidence_cos, 1e-9) for x in self.lit.lights]
+                [
+                    limits.noise_px / np.maximum(light.incidence_cos, 1e-9)
+                    for light in self.lit.lights
+                ]
             ),
             self.lit.lit,
+            np.hypot(placed, limits.ring_sigma_m or 0.0),
         )
 
     def count_lit(self, cameras: Sequence[PlannedCamera]) -> int:
@@ -207,4 +214,5 @@ def baseline_limits(scene: Scene, spare_field: float = 0.0) -> BaselineLimits:
         required.triangulation.min_ring_pitch_px,
         required.triangulation.max_sigma_m,
         spare_field,
+        required.triangulation.limited_calibration,
     )

@@ -33,6 +33,7 @@ _ASKED = (
     "min_reachable",
     "region_coverage",
     "accuracy_mm",
+    "accuracy_of",
     "up",
     "ring_axis",
     "seed",

@@ -10,6 +10,7 @@ from math import pi
 from typing import Any, Literal
 
 from .bodies import Body, Box, Mount, Triple
+from .calibration_errors import PERFECT, CalibrationErrors
 
 # Of a workspace: zones and standoffs that aren't given have no key.
 _ZONES = ("box", "keep_out", "mounting")
@@ -53,11 +54,14 @@ class TriangulationLimits:
     Attributes:
         min_conditioning: Least |r.m|, rings only.
         noise_px: s_0, edge noise at frontal light [px].
-        max_sigma_m: Largest s_N [m].
+        max_sigma_m: Largest s_N, or s of the whole budget [m].
         min_ring_pitch_px: Least distance of neighbouring rings in the image [px].
         ring_sigma_m: s_R, error of ring placement [m].
         min_angle: Least triangulation angle, `dense` and `none` only [rad].
         max_angle: Largest triangulation angle, `dense` and `none` only [rad].
+        calibration: What a calibration leaves of each device; None: nobody says.
+        accuracy_of: Whether `max_sigma_m` limits `noise` alone, or the `total` with
+            what the calibration leaves.
     """
 
     min_conditioning: float
@@ -67,6 +71,14 @@ class TriangulationLimits:
     ring_sigma_m: float | None = None
     min_angle: float | None = None
     max_angle: float | None = None
+    calibration: CalibrationErrors | None = None
+    accuracy_of: Literal["noise", "total"] = "total"
+
+    @property
+    def limited_calibration(self) -> CalibrationErrors:
+        """What the calibration leaves as far as `max_sigma_m` is a limit of it."""
+        whole = self.calibration if self.accuracy_of == "total" else None
+        return whole or PERFECT
 
 
 @dataclass(frozen=True)

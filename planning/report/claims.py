@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.repair.hollow import lies_inside
-from planning.model.document.coverage_records import Areas, Coverage, PredictedSigma
+from planning.model.document.coverage_records import Areas, Coverage
 from planning.scene.camera_views import view_of
 from planning.scene.draws import DRAWS
 from planning.scene.lighting import (
@@ -17,14 +17,11 @@ from planning.scene.lighting import (
 )
 from planning.scene.limits import camera_limits, projector_limits
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.measured import (
-    LitSamples,
-    least_sigma,
-)
 from planning.scene.placed_bodies import Blocker, Device, Obstruction, blocked_by
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
+from .error_budget import error_budget
 from .judged import Devices, Judged, by_cause
 from .region_claims import RegionClaim, RegionSamples, claim_regions
 
@@ -77,7 +74,7 @@ def make_claims(scene: Scene, devices: Devices) -> Claims:
             np.array(projector_limits.CAUSES)[target.furthest[unreachable]], weight
         ),
         unreachable_inside_m2=area(inside),
-        sigma=_sigma(planned, devices, target),
+        sigma=error_budget(planned, devices, target),
     )
     coverage = coverage.changed(**_blocked(planned, devices, target))
     lit, margin = target.first == LIT, lit_margins(scene, devices.projectors, samples)
@@ -159,22 +156,6 @@ def _blocked(
             key, name = "blocked_by_body_m2", next(d.id for d in every if body.is_of(d))
         blocked.setdefault(key, {})[name] = target.area(column)
     return blocked
-
-
-def _sigma(scene: Scene, devices: Devices, target: Judged) -> PredictedSigma | None:
-    chosen = np.flatnonzero(target.measured)
-    if not len(chosen):
-        return None
-    some = target.target.take(chosen)
-    lit = LitSamples.of(devices.projectors, some, target.first[chosen] == LIT)
-    views = [view_of(scene, camera, some) for camera in devices.cameras]
-    limits = scene.requirements.triangulation
-    least = np.min(
-        [least_sigma(limits, lit, views, p) for p in range(len(devices.projectors))],
-        axis=0,
-    )
-    median, p95 = np.quantile(least, (0.5, 0.95)).tolist()
-    return PredictedSigma(median_m=median, p95_m=p95)
 
 
 def _inside(scene: Scene, target: Target) -> NDArray[np.bool_]:

@@ -47,7 +47,12 @@ def build_requirements(
         if most is not None and not most >= 1:
             raise InputError(f"{name} = {most} must be 1 or more")
     _check_positive("tau_m", tau_m)
-    triangulation = _limits_of(TriangulationLimits, table.limits)
+    _check_choice("accuracy_of", wishes.accuracy_of, ("noise", "total"))
+    triangulation = replace(
+        _limits_of(TriangulationLimits, table.limits),
+        calibration=table.calibration.errors(),
+        accuracy_of=wishes.accuracy_of,
+    )
     if wishes.accuracy_mm is not None:
         _check_positive("accuracy_mm", wishes.accuracy_mm)
         triangulation = replace(triangulation, max_sigma_m=wishes.accuracy_mm * 1e-3)
@@ -160,6 +165,8 @@ def _limits_of(kind: type[_Limits], table: LimitsTable, device: str = "") -> _Li
     written = table.model_dump()
     values: dict[str, Any] = {}
     for field in fields(kind):
+        if field.name in ("calibration", "accuracy_of"):
+            continue
         stem = field.name.removesuffix("_m")
         keys = (field.name, f"{stem}_mm", f"{stem}_deg", f"{device}{stem}_deg")
         key = next(key for key in keys if key in written)

@@ -4,11 +4,13 @@ Unknown keys, numbers out of range, text for numbers and NaN are refused. What e
 means: `docs/reference/rig-files.md`.
 """
 
+import math
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from planning.model.bodies import BodyTable, MountTable
+from planning.model.calibration_errors import PERFECT, CalibrationErrors
 from planning.model.document.device_records import RingAxis
 from planning.model.table_types import (
     Acute,
@@ -205,6 +207,26 @@ class LimitsTable(Table):
         return self
 
 
+class CalibrationTable(Table):
+    """What a calibration leaves of each device, `[calibration]`."""
+
+    angle_deg: Annotated[float, Field(ge=0.0, le=5.0)] = 0.0
+    position_mm: Annotated[float, Field(ge=0.0)] = 0.0
+    focal_percent: Annotated[float, Field(ge=0.0, le=20.0)] = 0.0
+    principal_px: Annotated[float, Field(ge=0.0)] = 0.0
+    sources: dict[str, Name] = Field(default={})
+
+    def errors(self) -> CalibrationErrors | None:
+        """Return them in metres, radians and shares; None: nothing is left."""
+        errors = CalibrationErrors(
+            math.radians(self.angle_deg),
+            1e-3 * self.position_mm,
+            1e-2 * self.focal_percent,
+            self.principal_px,
+        )
+        return None if errors == PERFECT else errors
+
+
 class RequirementsTable(Table):
     """What share of the target a plan must reach, `[requirements]`."""
 
@@ -239,6 +261,7 @@ class RigTable(Table):
     rings: RingsTable = RingsTable()
     workspace: WorkspaceTable = WorkspaceTable()
     limits: LimitsTable = LimitsTable()
+    calibration: CalibrationTable = CalibrationTable()
     requirements: RequirementsTable = RequirementsTable()
     check: CheckTable = CheckTable()
     existing: list[ExistingTable] = Field(default=[])

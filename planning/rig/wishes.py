@@ -6,6 +6,7 @@ from typing import Literal
 from planning.model.document.device_records import RingAxis
 
 Pattern = Literal["rings", "dense", "none"]
+AccuracyOf = Literal["noise", "total"]
 TargetName = Literal["dominant", "surface"]
 
 
@@ -26,5 +27,6 @@ class Wishes:
     min_reachable: float | None = None
     region_coverage: float | None = None
     accuracy_mm: float | None = None
+    accuracy_of: AccuracyOf = "total"
     up: str | None = None
     ring_axis: RingAxis | None = None

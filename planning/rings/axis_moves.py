@@ -15,6 +15,7 @@ from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.scene.camera_views import view_of
 from planning.scene.draws import DRAWS
 from planning.scene.lights import light_of
+from planning.scene.limits.calibration_terms import calibration_px, surface_deviation
 from planning.scene.limits.camera_limits import ViewedSamples
 from planning.scene.measured import (
     LitSamples,
@@ -193,7 +194,13 @@ def axis_program(
     spread += facing[:, :, None, None] * np.eye(3)
     jacobians = np.stack([view.jacobian for view in seen], axis=1)
     slopes = np.einsum("ikja,ikjl->ikal", jacobians, spread)
+    errors = limits.limited_calibration
     noise = limits.noise_px / np.maximum(samples.lights[p].incidence_cos[chosen], 1e-9)
+    # A pixel turns a ray by |J| / sqrt 2, whatever the direction, or nearly so.
+    per_px = np.maximum(np.linalg.norm(jacobians, axis=(2, 3)), 1e-12) / np.sqrt(2.0)
+    turned = calibration_px(errors, distances, per_px) * distances
+    levers = samples.surfaces[p].levers[chosen]
+    placed = np.hypot(surface_deviation(errors, levers), limits.ring_sigma_m or 0.0)
     conditioning = max(limits.min_conditioning, _LEAST_CONDITIONING)
     max_sigma, min_pitch = limits.max_sigma_m or np.inf, limits.min_ring_pitch_px or 0.0
     few, others = taken(samples, chosen, samples.lit), np.zeros(len(chosen))
@@ -213,8 +220,8 @@ def axis_program(
         rays=rays @ turn,
         slopes=slopes @ turn,
         seen=np.stack([view.seen for view in seen], axis=1),
-        noise=noise[:, None] * distances,
-        placement_m=(limits.ring_sigma_m or 0.0) * np.abs(facing),
+        noise=np.hypot(noise[:, None] * distances, turned),
+        placement_m=placed[:, None] * np.abs(facing),
         facing=np.abs(facing) / distances,
         others=others,
         held=transform(into, points[lit]),

@@ -5,12 +5,16 @@ the viewing ray, t = |P - O|, N the surface normal, m the unit normal of the sur
 equal code, J_r = dr/d(u, v), v = r x (N x m) and g = J_r^T v::
 
     s_N^2 = (s_px t |g| / |r.m|)^2 + (s_R |N.r| / |r.m|)^2
+    s_C^2 = (s_v / |r.m|)^2 + (s_m |N.r| / |r.m|)^2
     pitch = h |N.r| / (t |g|)
 
-with s_px = s_0 / (-N.L) and h the spacing along m. `formulation.md`, section 3.
+with s_px = s_0 / (-N.L) and h the spacing along m; s_v and s_m are what errors of the
+calibration move the viewing ray by along v, and the surface of equal code along m
+(`calibration_terms`). `formulation.md`, sections 3 and 8.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +22,7 @@ from numpy.typing import NDArray
 from geometry.rays.visibility import Visibility
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import CameraLimits, TriangulationLimits
+from planning.scene.limits.calibration_terms import ray_deviation, surface_deviation
 from planning.scene.limits.camera_limits import (
     BLOCKED,
     CAMERA_LIMITS,
@@ -28,7 +33,7 @@ from planning.scene.limits.camera_limits import (
     ViewedSamples,
 )
 from planning.scene.limits.limit import first_violated
-from planning.scene.limits.pair_limits import PAIR_LIMITS, PairQuality
+from planning.scene.limits.pair_limits import PAIR_LIMITS, PairQuality, Term
 from planning.scene.patterns import CodeSurfaces
 
 from .placed_bodies import Blocker, first_blocked
@@ -48,10 +53,14 @@ def view(
     near = np.flatnonzero(first >= OCCLUDED)
     between = first_between(camera, target.take(near), visibility, bodies)
     first[near] = np.minimum(first[near], between)
-    jacobian = np.zeros((len(target), 3, 2))
-    seen, turn = first == SEEN, camera.world_from_device[:3, :3]
-    jacobian[seen] = turn @ camera.device.ray_jacobian(rays.local[seen])
-    return ViewedSamples(first, rays.rays, rays.distances, rays.facing, jacobian)
+    jacobian, off_centre = np.zeros((len(target), 3, 2)), np.zeros((len(target), 2))
+    seen, turn, device = first == SEEN, camera.world_from_device[:3, :3], camera.device
+    local = rays.local[seen]
+    jacobian[seen] = turn @ device.ray_jacobian(local)
+    off_centre[seen] = device.project(local) - device.camera_matrix[:2, 2]
+    return ViewedSamples(
+        first, rays.rays, rays.distances, rays.facing, jacobian, off_centre
+    )
 
 
 def first_between(
@@ -76,20 +85,29 @@ def pair_quality(
     seen: ViewedSamples,
     limits: TriangulationLimits,
 ) -> PairQuality:
-    """Return |r.m|, s_N and pitch of a pair at samples."""
+    """Return |r.m|, the deviations and pitch of a pair at samples."""
     r, m = seen.rays, surfaces.normals
     along = np.einsum("ij,ij->i", r, m)
     v = normals * along[:, None] + m * seen.facing[:, None]
-    gu, gv = np.einsum("ijk,ij->ik", seen.jacobian, v).T
+    turned = np.einsum("ijk,ij->ik", seen.jacobian, v)
+    gu, gv = turned.T
     g = np.sqrt(gu * gu + gv * gv)
     conditioning, facing = np.abs(along), np.abs(seen.facing)
-    safe = np.maximum(conditioning, 1e-12)
-    noise = limits.noise_px / np.maximum(light.incidence_cos, 1e-9)
-    spread = noise * seen.distances * g / safe
-    placement = (limits.ring_sigma_m or 0.0) * facing / safe
+    per = 1.0 / np.maximum(conditioning, 1e-12)
+    edge = limits.noise_px / np.maximum(light.incidence_cos, 1e-9)
+    terms: dict[Term, NDArray[np.float64]] = {"edges": edge * seen.distances * g * per}
+    if limits.ring_sigma_m is not None:
+        terms["rings"] = limits.ring_sigma_m * facing * per
+    sigma = np.hypot(terms["edges"], terms.get("rings", 0.0))
+    if (errors := limits.calibration) is not None:
+        terms["camera"] = ray_deviation(errors, seen, v, turned) * per
+        placed = surface_deviation(errors, surfaces.levers)
+        terms["projector"] = placed * facing * per
     pitch = surfaces.spacing * facing / np.maximum(seen.distances * g, 1e-15)
-    sigma = np.hypot(spread, placement)
-    return PairQuality(conditioning, sigma, pitch, seen, light)
+    quality = PairQuality(conditioning, sigma, terms, pitch, seen, light)
+    if errors is None or limits.accuracy_of == "noise":
+        return quality
+    return replace(quality, sigma=quality.total)
 
 
 def first_pair_failure(

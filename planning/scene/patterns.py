@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.devices import ParallelModel
+from geometry.mesh.tensors import lengths
 from geometry.poses import inverse, transform
 from planning.model.planned import PlannedProjector
 
@@ -19,11 +21,15 @@ _WIDEST = 1e3
 class CodeSurfaces(SampleArrays):
     """One projector's surfaces of equal code at n samples.
 
-    Unit normals m in the world, and h, the distance of neighbouring edges along m [m].
+    Attributes:
+        normals: Unit normals m in the world, shape (n, 3).
+        spacing: h, distance of neighbouring edges along m [m], shape (n,).
+        levers: How far errors of the projector move them, `surface_levers`, (n, 3).
     """
 
     normals: NDArray[np.float64]
     spacing: NDArray[np.float64]
+    levers: NDArray[np.float64]
 
 
 class RingPattern:
@@ -54,7 +60,9 @@ class RingPattern:
         index = np.searchsorted(radii, surface.coordinate)
         index = np.clip(index, 1, len(radii) - 1)
         gaps = radii[index] - radii[index - 1]
-        return CodeSurfaces(surface.normals @ frame[:3, :3].T, gaps * surface.stretch)
+        m = surface.normals @ frame[:3, :3].T
+        levers = surface_levers(self.projector, points, m)
+        return CodeSurfaces(m, gaps * surface.stretch, levers)
 
     def with_border(self) -> PlannedProjector:
         """Return the projector with all that it lights beyond the last edge, too."""
@@ -69,6 +77,37 @@ class RingPattern:
 
     def _local(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         return transform(inverse(self.projector.world_from_ring), points)
+
+
+def surface_levers(
+    projector: PlannedProjector, points: NDArray[np.float64], m: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return how far errors of a projector move its surfaces along m, in [m], (n, 3).
+
+    With Q the origin of the device: of a turn by 1 rad |(P - Q) x m|; of a focal length
+    that is off by the whole, and of a principal point 1 px off along the line that
+    counts most, in light from a point::
+
+        |P - Q| |J_r^T m . (u - u_0)|,    |P - Q| |J_r^T m|
+
+    and in parallel light, where pixels are w apart, |m_x x + m_y y| and w |(m_x, m_y)|,
+    in the device's frame.
+    """
+    pose, device = projector.world_from_device, projector.device
+    offsets = points - pose[:3, 3]
+    turned = lengths(np.cross(offsets, m))
+    local = transform(inverse(pose), points)
+    across = m @ pose[:3, :3]
+    if isinstance(device, ParallelModel):
+        wider = np.einsum("ij,ij->i", across[:, :2], local[:, :2])
+        shifted = device.pixel_pitch_m * np.hypot(*across[:, :2].T)
+    else:
+        per_px = np.einsum("ijk,ij->ik", device.ray_jacobian(local), across)
+        per_px *= lengths(offsets)[:, None]
+        off_centre = device.project(local) - device.camera_matrix[:2, 2]
+        wider = np.einsum("ij,ij->i", per_px, off_centre)
+        shifted = np.hypot(*per_px.T)
+    return np.column_stack([turned, wider, shifted])
 
 
 # A class for each `PlannedProjector.pattern`.

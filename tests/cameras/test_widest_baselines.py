@@ -296,13 +296,13 @@ def test_what_rings_ask_is_what_measurability_says():
     r, normal = ray / t[:, None], ball.normals[rows]
     jacobian = pose[:3, :3] @ DEVICE.ray_jacobian(ray @ pose[:3, :3])
     view = ViewedSamples(
-        np.zeros(len(rows)), r, t, -np.sum(r * normal, axis=1), jacobian
+        np.zeros(len(rows)), r, t, -np.sum(r * normal, axis=1), jacobian, 0.0 * r
     )
     asked = TriangulationLimits(0.1, 0.1, 3e-4, 6.0)
     measured = np.zeros((len(rows), 2), dtype=bool)
     for k in range(2):
         incidence = SimpleNamespace(incidence_cos=light[k, rows])
-        drawn = CodeSurfaces(ring[k, rows], spacing[k, rows])
+        drawn = CodeSurfaces(ring[k, rows], spacing[k, rows], 0.0 * r)
         quality = pair_quality(normal, incidence, drawn, view, asked)
         measured[:, k] = first_pair_failure(quality, asked) == MEASURED
         measured[:, k] &= lit[rows, k]

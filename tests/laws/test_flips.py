@@ -155,7 +155,7 @@ def test_a_sign_flipped_in_the_ring_normal_is_seen(made, monkeypatch):
         rings = right(pattern, points)
         turn = pattern.projector.world_from_ring[:3, :3]
         normals = (rings.normals @ turn * [1.0, 1.0, -1.0]) @ turn.T
-        return CodeSurfaces(normals, rings.spacing)
+        return CodeSurfaces(normals, rings.spacing, rings.levers)
 
     def measured():
         lit = lit_samples(draft.scene, plan.projectors, samples)

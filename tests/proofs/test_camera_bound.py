@@ -91,7 +91,12 @@ def everything_lit(scene, n):
     across /= np.linalg.norm(across, axis=1)[:, None]
     light = LightOnSamples(one, 0.0 * one, np.zeros((n, 3)))
     lit = np.ones((n, 1), dtype=bool)
-    return LitSamples(target, lit, (light,), (CodeSurfaces(across, 0.01 * one),))
+    return LitSamples(
+        target,
+        lit,
+        (light,),
+        (CodeSurfaces(across, 0.01 * one, np.zeros((len(one), 3))),),
+    )
 
 
 FREE = {"min_conditioning": 0.0, "max_sigma_m": None, "min_ring_pitch_px": None}
@@ -274,7 +279,11 @@ def test_what_any_place_and_aim_measures_is_admitted(limit, value, name):
     m /= np.linalg.norm(m, axis=1)[:, None]
     spacing, cosine = rng.uniform(1e-3, 6e-3, n), rng.uniform(0.5, 1.0, n)
     light = replace(rows.lights[0], incidence_cos=cosine)
-    rows = replace(rows, lights=(light,), surfaces=(CodeSurfaces(m, spacing),))
+    rows = replace(
+        rows,
+        lights=(light,),
+        surfaces=(CodeSurfaces(m, spacing, np.zeros((len(m), 3))),),
+    )
     required = scene_of(sphere(0.1), limits=FREE | {limit: value}).requirements
     normals = rows.target.samples.normals
     towards = _turned_by(normals, np.radians(rng.uniform(0, 85, n)), rng)

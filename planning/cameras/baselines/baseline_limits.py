@@ -5,8 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.calibration_errors import PERFECT, CalibrationErrors
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import Workspace
+from planning.scene.limits.calibration_terms import calibration_px
 
 from .seams import SampledSurface
 
@@ -25,9 +27,10 @@ class BaselineLimits:
         min_conditioning: Least |r.m|.
         workspace: Where cameras may stand.
         min_ring_pitch_px: Least distance of neighbouring rings in the image [px].
-        max_sigma_m: Largest s_N [m].
+        max_sigma_m: Largest standard deviation along the normal [m].
         spare_field: What seams keep free of the half fields [rad], at least that by
             which proposals stay inside their limits.
+        calibration: What the calibration leaves of a camera.
     """
 
     max_incidence: float
@@ -36,6 +39,7 @@ class BaselineLimits:
     min_ring_pitch_px: float | None = None
     max_sigma_m: float | None = None
     spare_field: float = 0.0
+    calibration: CalibrationErrors = PERFECT
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,12 +51,15 @@ class RingsOnSurface:
         spacing: h, ring spacing along m in [m], shape (n_p, n).
         noise_px: s_px, edge noise in [px], shape (n_p, n).
         lit: Whether a projector lights a sample, shape (n, n_p).
+        placed: Standard deviation of the ring surfaces along m [m], shape (n_p, n);
+            0: as drawn.
     """
 
     normals: _Array
     spacing: _Array
     noise_px: _Array
     lit: NDArray[np.bool_]
+    placed: _Array | float = 0.0
 
 
 def best_rings(
@@ -66,7 +73,8 @@ def best_rings(
 
     With g = J_r^T v, |g| = c |v| / f, where c is 1 on the optical axis and hardly
     changes as the camera moves; so the limits become m.r >= q t |v| and
-    -N.r >= p t |v| with q = s_px c / (f max_sigma) and p = min_pitch c / (h f).
+    -N.r >= p t |v| with q = s_px c / (f max_sigma) and p = min_pitch c / (h f), where
+    s_px c / f holds also what the calibration leaves, as it is at this pose.
 
     Returns:
         Ring normals with m.r > 0, (q, 3); q and p in [1/m], 0 where the limit doesn't
@@ -83,9 +91,12 @@ def best_rings(
     jacobian = pose[:3, :3] @ camera.device.ray_jacobian(ray @ pose[:3, :3])
     g = np.linalg.norm(np.einsum("ijk,pij->pik", jacobian, v), axis=2)
     per_length = g / np.maximum(np.linalg.norm(v, axis=2), 1e-9)
-    sigma = rings.noise_px[:, samples] * per_length / (limits.max_sigma_m or np.inf)
+    reach = np.maximum(distance * np.linalg.norm(v, axis=2), 1e-12)
+    placed = np.broadcast_to(rings.placed, rings.spacing.shape)[:, samples]
+    turned = calibration_px(limits.calibration, distance, per_length)
+    edge = per_length * np.hypot(rings.noise_px[:, samples], turned)
+    sigma = np.hypot(edge, placed * facing / reach) / (limits.max_sigma_m or np.inf)
     pitch = (limits.min_ring_pitch_px or 0.0) * per_length / rings.spacing[:, samples]
-    reach = distance * np.linalg.norm(v, axis=2)
     spare = np.minimum(
         np.abs(along) - np.maximum(limits.min_conditioning, sigma * reach),
         facing - pitch * reach,

@@ -132,6 +132,13 @@ from planning.cli.console import (
     help="Largest standard deviation along the normal [default: 0.3].",
 )
 @click.option(
+    "--accuracy-of",
+    type=click.Choice(["total", "noise"]),
+    default="total",
+    help="What --accuracy limits: with what the rig's [calibration] leaves, or noise "
+    "alone.",
+)
+@click.option(
     "--cameras-by",
     type=click.Choice(["cover", "paper", "both"]),
     default="both",

@@ -30,13 +30,26 @@ class Relaxation(Part):
 
 
 class PredictedSigma(Part):
-    """Standard deviation along the normal, by the best pair of each measured sample.
+    """Standard deviation along the normal of the target's measured samples [m].
 
-    Of `noise_px` and `ring_sigma_m` alone: calibration is taken as perfect.
+    Of each the pair that measures it with the least, what the calibration leaves
+    included where the rig states it.
+
+    Attributes:
+        noise_median_m: Of edge noise and misplaced rings alone, of the same pairs; None
+            in plans from before.
+        noise_p95_m: Likewise.
+        terms_rms_m: Root mean square of each independent term: `edges`, `rings`, and
+            of the calibration `camera` and `projector`; absent where nothing states it.
     """
 
     median_m: float
     p95_m: float
+    noise_median_m: float | None = None
+    noise_p95_m: float | None = None
+    terms_rms_m: dict[Literal["edges", "rings", "camera", "projector"], float] = Field(
+        default={}
+    )
 
 
 class Coverage(Part):

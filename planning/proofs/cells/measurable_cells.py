@@ -9,7 +9,7 @@ image's bounds on |g| / |v| and on z / t (`image_cone`)::
     |r.m|   <= cos(max(0, acos|u_c.m| - psi))               must reach min_conditioning
     |N.r|   <= cos(max(0, incidence_c - psi))
     |g|     >= |w| sin(max(0, angle(u_c, line of w) - psi)) least_turn
-    s_N     >= s_px (t_c - e) |g| / |r.m|                   must not exceed the limit
+    sigma   >= s_px (t_c - e) |g| / |r.m|                   must not exceed the limit
     pitch   <= h |N.r| / ((t_c - e) |g|)                    must reach min_ring_pitch
     z       >= (t_c - e) cos(off axis),  z / (f |N.r|)      must not exceed the limit
 
@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
 from planning.model.requirements import Requirements
+from planning.scene.limits.calibration_terms import surface_deviation
 from planning.scene.limits.camera_limits import CAMERA_LIMITS, CellView
 from planning.scene.limits.limit import may_hold
 from planning.scene.limits.pair_limits import PAIR_LIMITS, PairCell
@@ -53,7 +54,15 @@ class MeasurableCells:
         self._across = np.stack([ring.normals for ring in samples.surfaces])
         self._spacing = np.stack([ring.spacing for ring in samples.surfaces])
         cosines = np.stack([light.incidence_cos for light in samples.lights])
-        self._noise = self._pair.noise_px / np.maximum(cosines, 1e-9)
+        errors = self._pair.limited_calibration
+        # A turn by 1 rad moves a ray by 1 / least_turn pixels at most.
+        turned = errors.about_axis / self._image.least_turn
+        edge = self._pair.noise_px / np.maximum(cosines, 1e-9)
+        self._noise = np.sqrt(edge**2 + turned**2 + errors.along_line_px**2)
+        levers = np.stack([ring.levers for ring in samples.surfaces])
+        placed = surface_deviation(errors, levers)
+        squarely = np.cos(self._camera.max_incidence)
+        self._placed = np.hypot(placed, self._pair.ring_sigma_m or 0.0) * squarely
         along = np.cross(normals, self._across)
         self._width = np.linalg.norm(along, axis=2)
         self._along = along / np.where(self._width > 0.0, self._width, 1.0)[..., None]
@@ -87,7 +96,8 @@ class MeasurableCells:
             turn = _least_sine(np.abs(_dot(self._along[p, k], u)), c, s)
             g = nearest[at] * self._image.least_turn * self._width[p, k] * turn
             noise, spacing = self._noise[p, k], self._spacing[p, k]
-            pair = PairCell(crossing, facing[at], g, noise, spacing)
+            placed = self._placed[p, k]
+            pair = PairCell(crossing, facing[at], g, noise, spacing, placed)
             admitted[at] = may_hold(PAIR_LIMITS, pair, self._pair, len(k))
         return admitted
 

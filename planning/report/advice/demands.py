@@ -121,4 +121,5 @@ def _viewed(camera: PlannedCamera, rays: CameraRays) -> ViewedSamples:
         rays.distances,
         rays.facing,
         turn @ camera.device.ray_jacobian(rays.local),
+        camera.device.project(rays.local) - camera.device.camera_matrix[:2, 2],
     )

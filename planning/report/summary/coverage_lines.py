@@ -40,16 +40,7 @@ def coverage_lines(plan: RigPlan) -> list[str]:
         f"lit / reachable by projectors {lit}, measured / reachable by "
         f"cameras {measured}, on the target, {coverage.samples} fresh samples",
     ]
-    if sigma := coverage.sigma:
-        limits = plan.requirements.triangulation
-        limit = limits.max_sigma_m
-        at_most = "" if limit is None else f" (limit {1e3 * limit:g})"
-        lines.append(
-            f"predicted sigma along the normal, of {limits.noise_px:g} px edge noise "
-            f"alone: median {1e3 * sigma.median_m:.3f} mm, 95 % within "
-            f"{1e3 * sigma.p95_m:.3f} mm"
-            f"{at_most}"
-        )
+    lines += _sigma_lines(plan)
     if causes := coverage.uncovered_by_cause:
         lines.append(f"not measured: {causes_line(causes, target.area_m2)}")
     if blocked := coverage.blocked_by_obstacle_m2:
@@ -61,6 +52,34 @@ def coverage_lines(plan: RigPlan) -> list[str]:
         *labelled("COVERAGE", lines),
         *region_lines(plan),
         *schedule_lines(document),
+    ]
+
+
+def _sigma_lines(plan: RigPlan) -> list[str]:
+    """Say how exact points will be: of noise alone, and with the calibration's part."""
+    sigma, limits = plan.coverage.sigma, plan.requirements.triangulation
+    if sigma is None:
+        return []
+
+    def share(median_m: float, p95_m: float) -> str:
+        return f"median {1e3 * median_m:.3f} mm, 95 % within {1e3 * p95_m:.3f} mm"
+
+    limit = limits.max_sigma_m
+    at_most = "" if limit is None else f" (limit {1e3 * limit:g})"
+    whole = share(sigma.median_m, sigma.p95_m)
+    if limits.calibration is None:
+        return [
+            f"predicted sigma along the normal, of {limits.noise_px:g} px edge noise "
+            f"alone: {whole}{at_most}; the rig states no [calibration]"
+        ]
+    noise = share(sigma.noise_median_m or 0.0, sigma.noise_p95_m or 0.0)
+    of_noise = at_most if limits.accuracy_of == "noise" else ""
+    of_all = "" if limits.accuracy_of == "noise" else at_most
+    terms = ", ".join(f"{k} {1e3 * v:.3f}" for k, v in sigma.terms_rms_m.items())
+    return [
+        f"predicted sigma along the normal, of {limits.noise_px:g} px edge noise "
+        f"alone: {noise}{of_noise}",
+        f"with what the calibration leaves: {whole}{of_all}; rms by term {terms} mm",
     ]
 
 

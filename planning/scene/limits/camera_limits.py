@@ -78,6 +78,7 @@ class ViewedSamples(SampleArrays):
         distances: t in [m], shape (n,).
         facing: -N.r, shape (n,).
         jacobian: J_r in the world in [1/px], shape (n, 3, 2); 0 where a limit fails.
+        off_centre: Pixels from the principal point, shape (n, 2); 0 likewise.
     """
 
     first_violated: NDArray[np.int8]
@@ -85,6 +86,7 @@ class ViewedSamples(SampleArrays):
     distances: Array
     facing: Array
     jacobian: Array
+    off_centre: Array
 
     @property
     def seen(self) -> Mask:

@@ -6,7 +6,7 @@ viewing ray, |r.m|, s_N and the pitch are those of `measurability`.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -25,6 +25,10 @@ from .limit import (
     to_step,
 )
 
+# Of the edge's noise and of misplaced rings, s_N; of the calibration, s_C.
+Term = Literal["edges", "rings", "camera", "projector"]
+TERMS: tuple[Term, ...] = get_args(Term)
+
 # Beyond these no limit is worth relaxing: first-order errors hold no longer.
 _LEAST_CONDITIONING = 0.03
 _LEAST_PITCH_PX = 3.0
@@ -36,7 +40,9 @@ class PairQuality:
 
     Attributes:
         conditioning: |r.m|, shape (n,).
-        sigma: s_N in [m], shape (n,).
+        sigma: What `max_sigma_m` limits: s_N, or sqrt(s_N^2 + s_C^2) [m], shape (n,).
+        terms: Independent parts of the deviation along the normal by `TERMS` [m], (n,)
+            each; what is stated of none of them is absent.
         pitch: Distance of neighbouring rings in the image in [px], shape (n,).
         view: How the camera sees them: it stands at -t r from a sample.
         light: That falls on them: the projector stands at minus its offsets.
@@ -44,16 +50,23 @@ class PairQuality:
 
     conditioning: Array
     sigma: Array
+    terms: dict[Term, Array]
     pitch: Array
     view: ViewedSamples
     light: LightOnSamples
+
+    @property
+    def total(self) -> Array:
+        """Root of the sum of the squares of all terms, in [m], shape (n,)."""
+        return np.sqrt(sum(np.square(term) for term in self.terms.values()))
 
 
 @dataclass(frozen=True, eq=False)
 class PairCell:
     """The best of one projector with a camera anywhere in a cell of poses, (k,) each.
 
-    |r.m| and |N.r| at most, t |g| at least; s_px in [px] and h in [m].
+    |r.m| and |N.r| at most, t |g| at least; s_px in [px], h in [m], and at least what
+    moves the surfaces of equal code, times |N.r| [m].
     """
 
     conditioning: Array
@@ -61,6 +74,7 @@ class PairCell:
     shift: Array
     noise: Array
     spacing: Array
+    placement: Array
 
 
 class Conditioning(Limit[PairQuality, PairCell, TriangulationLimits]):
@@ -91,7 +105,7 @@ class Conditioning(Limit[PairQuality, PairCell, TriangulationLimits]):
 
 
 class Sigma(Limit[PairQuality, PairCell, TriangulationLimits]):
-    """s_N <= max_sigma."""
+    """s_N, or with the calibration's s_C sqrt(s_N^2 + s_C^2), <= max_sigma."""
 
     name = "sigma"
     words = "measured with too large a deviation"
@@ -102,11 +116,11 @@ class Sigma(Limit[PairQuality, PairCell, TriangulationLimits]):
         return None if limit is None else view.sigma <= limit
 
     def may_hold(self, cell: PairCell, rules: TriangulationLimits) -> Mask | None:
-        """Return which may be, from the edge noise alone."""
+        """Return which may be, from the least of each term that a cell leaves."""
         limit = rules.max_sigma_m
         if limit is None:
             return None
-        edge = cell.noise * cell.shift * (1.0 - ROUNDING)
+        edge = np.hypot(cell.noise * cell.shift, cell.placement) * (1.0 - ROUNDING)
         return edge <= limit * np.maximum(cell.conditioning, 1e-12)
 
     def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:

@@ -13,7 +13,14 @@ from geometry.devices import ParallelModel, PinholeModel
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
 
-from .audit_optics import in_frame, in_image, in_world, pixels_of, towards
+from .audit_optics import (
+    in_frame,
+    in_image,
+    in_world,
+    lens_shifts,
+    pixels_of,
+    towards,
+)
 from .occlusion import Block, bodies_about, bodies_but
 
 # Steps after which the ball is a few thousandths too large at most.
@@ -102,6 +109,10 @@ class DivergingRays:
         """Return what a length across the light at the standoff is of c."""
         return length_m / standoff_m
 
+    def panel_shifts(self, local: Array, m: Array) -> tuple[Array, Array]:
+        """Return what a panel twice as wide, and 1 px, shift along m [m], (n,) each."""
+        return lens_shifts(self.device, local, m)
+
 
 @dataclass(frozen=True, eq=False)
 class ParallelRays:
@@ -161,6 +172,11 @@ class ParallelRays:
     def coordinate_of(self, length_m: float, standoff_m: float) -> float:
         """Return what a length across the light is of c."""
         return length_m
+
+    def panel_shifts(self, local: Array, m: Array) -> tuple[Array, Array]:
+        """Return what a panel twice as wide, and 1 px, shift along m [m], (n,) each."""
+        per_px = self.device.pixel_pitch_m * np.hypot(m[:, 0], m[:, 1])
+        return m[:, 0] * local[:, 0] + m[:, 1] * local[:, 1], per_px
 
 
 def light_from(

@@ -95,3 +95,16 @@ def pixel_gradient(device: PinholeModel, local: Array, across: Array) -> Array:
     g_u = (p * b[:, 1] - q * a[:, 1]) / determinant
     g_v = (q * a[:, 0] - p * b[:, 0]) / determinant
     return np.column_stack([g_u, g_v])
+
+
+def lens_shifts(
+    device: PinholeModel, local: Array, across: Array
+) -> tuple[Array, Array]:
+    """Return what a focal length twice as long, and 1 px, move rays by [m], (n,) each.
+
+    Along vectors (n, 3) across the rays to points (n, 3), all in the device's frame.
+    """
+    gradient = pixel_gradient(device, local, across)
+    off_centre = pixels_of(device, local) - device.camera_matrix[:2, 2]
+    reach = np.linalg.norm(local, axis=1)
+    return reach * dot(gradient, off_centre), reach * np.linalg.norm(gradient, axis=1)

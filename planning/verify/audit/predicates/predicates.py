@@ -16,7 +16,8 @@ from planning.model.requirements import (
 from planning.verify.audit.audit_samples import AuditSamples
 
 from .audit_devices import AuditCamera, AuditProjector
-from .audit_optics import dot, in_frame, in_image, pixel_gradient, pixels_of, towards
+from .audit_optics import dot, in_frame, in_image, pixels_of, towards
+from .error_terms import NOISE_TERMS, PairGeometry, deviation, error_terms
 from .occlusion import Shadow, free_of
 
 Steps = NDArray[np.int8]
@@ -114,39 +115,14 @@ def pair_steps(
     limits: TriangulationLimits,
 ) -> Steps:
     """Return how many limits of *measurable* lit and seen samples pass, shape (n,)."""
-    conditioning, sigma, pitch = pair_figures(projector, camera, samples, limits)
+    pair = PairGeometry.of(projector, camera, samples)
+    names = NOISE_TERMS if limits.accuracy_of == "noise" else None
+    sigma = deviation(error_terms(pair, limits), names)
     return _passed(
-        conditioning >= limits.min_conditioning,
+        pair.conditioning >= limits.min_conditioning,
         sigma <= _or(limits.max_sigma_m, np.inf),
-        pitch >= _or(limits.min_ring_pitch_px, -np.inf),
+        pair.pitch >= _or(limits.min_ring_pitch_px, -np.inf),
     )
-
-
-def pair_figures(
-    projector: AuditProjector,
-    camera: AuditCamera,
-    samples: AuditSamples,
-    limits: TriangulationLimits,
-) -> tuple[Array, Array, Array]:
-    """Return |r.m|, the standard deviation [m] and the ring pitch [px], each (n,)."""
-    light, _ = projector.light.to_points(samples.points)
-    r, t = towards(samples.points, camera.world_from_device[:3, 3])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        gradient = projector.ring_gradient(samples.points)
-        steepness = np.linalg.norm(gradient, axis=1)
-        m = gradient / steepness[:, None]
-        normal = samples.normals
-        v = normal * dot(r, m)[:, None] - m * dot(r, normal)[:, None]
-        turn = camera.world_from_device[:3, :3]
-        local = in_frame(camera.world_from_device, samples.points)
-        g = np.linalg.norm(pixel_gradient(camera.device, local, v @ turn), axis=1)
-        conditioning = np.abs(dot(r, m))
-        edge = limits.noise_px / -dot(normal, light)
-        placement = _or(limits.ring_sigma_m, 0.0) * dot(normal, r)
-        sigma = np.hypot(edge * t * g, placement) / conditioning
-        gap = projector.ring_gap(projector.ring_coordinate(samples.points))
-        pitch = gap / steepness * np.abs(dot(normal, r)) / (t * g)
-    return conditioning, sigma, pitch
 
 
 def _passed(*conditions: Mask) -> Steps:

@@ -1,0 +1,121 @@
+"""What a pair of projector and camera measures of each sample, and how exactly.
+
+A point lies where its viewing ray meets its ring surface. With w = N - m (N.r) / (m.r)
+it moves along the normal by w.dX if its ray moves by dX there, and by (m.dY) (N.r) /
+(m.r) if the surface moves by dY: each error of a device is one of either.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.arrays import Array
+from planning.model.requirements import TriangulationLimits
+from planning.verify.audit.audit_samples import AuditSamples
+
+from .audit_devices import AuditCamera, AuditProjector
+from .audit_optics import dot, in_frame, lens_shifts, pixel_gradient, towards
+
+NOISE_TERMS = ("edges", "rings")
+
+
+@dataclass(frozen=True, eq=False)
+class PairGeometry:
+    """A pair at n samples, each (n,) or (n, 3).
+
+    Attributes:
+        m: Unit normals of the ring surfaces.
+        w: What an error of a viewing ray moves the point by, along the normal.
+        levers: (N.r) / (m.r), what an error of a ring surface moves it by.
+        per_px: What an edge that is off by 1 px does along the normal [m/px].
+        incidence: -N.L.
+        conditioning: |r.m|.
+        pitch: Of neighbouring rings in the image [px].
+    """
+
+    projector: AuditProjector
+    camera: AuditCamera
+    points: Array
+    m: Array
+    w: Array
+    levers: Array
+    per_px: Array
+    incidence: Array
+    conditioning: Array
+    pitch: Array
+
+    @classmethod
+    def of(
+        cls, projector: AuditProjector, camera: AuditCamera, samples: AuditSamples
+    ) -> "PairGeometry":
+        """Look at lit and seen samples with a pair."""
+        points, normal = samples.points, samples.normals
+        light, _ = projector.light.to_points(points)
+        r, t = towards(points, camera.world_from_device[:3, 3])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            gradient = projector.ring_gradient(points)
+            steepness = np.linalg.norm(gradient, axis=1)
+            m = gradient / steepness[:, None]
+            levers = dot(normal, r) / dot(m, r)
+            w = normal - m * levers[:, None]
+            turn = camera.world_from_device[:3, :3]
+            local = in_frame(camera.world_from_device, points)
+            g = np.linalg.norm(pixel_gradient(camera.device, local, w @ turn), axis=1)
+            gap = projector.ring_gap(projector.ring_coordinate(points))
+            pitch = gap / steepness * np.abs(levers) / (t * g)
+        return cls(
+            *(projector, camera, points, m, w, levers, t * g),
+            -dot(normal, light),
+            np.abs(dot(r, m)),
+            pitch,
+        )
+
+
+def deviation(terms: dict[str, Array], names: Iterable[str] | None = None) -> Array:
+    """Return the root of the sum of the squares of terms, all or those named, (n,)."""
+    chosen = terms if names is None else [name for name in names if name in terms]
+    return np.sqrt(sum(terms[name] ** 2 for name in chosen))
+
+
+def error_terms(pair: PairGeometry, limits: TriangulationLimits) -> dict[str, Array]:
+    """Return independent parts of the deviation along the normal [m], (n,) each."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        terms = {"edges": limits.noise_px / pair.incidence * pair.per_px}
+        if limits.ring_sigma_m is not None:
+            terms["rings"] = limits.ring_sigma_m * np.abs(pair.levers)
+        if limits.calibration is None:
+            return terms
+        angle, position, focal, principal = (
+            limits.calibration.angle / np.sqrt(3.0),
+            limits.calibration.position_m / np.sqrt(3.0),
+            limits.calibration.focal,
+            limits.calibration.principal_px / np.sqrt(2.0),
+        )
+        for name, device, across, (longer, per_px) in (
+            ("camera", pair.camera, pair.w, _image_shifts(pair)),
+            ("projector", pair.projector, pair.m, _panel_shifts(pair)),
+        ):
+            offset = pair.points - device.world_from_device[:3, 3]
+            terms[name] = np.sqrt(
+                (angle * np.linalg.norm(np.cross(offset, across), axis=1)) ** 2
+                + position**2 * dot(across, across)
+                + (focal * longer) ** 2
+                + (principal * per_px) ** 2
+            )
+        terms["projector"] *= np.abs(pair.levers)
+    return terms
+
+
+def _image_shifts(pair: PairGeometry) -> tuple[Array, Array]:
+    """Return what a focal length doubled, and 1 px, move the points by [m], (n,)."""
+    pose, device = pair.camera.world_from_device, pair.camera.device
+    local = in_frame(pose, pair.points)
+    return lens_shifts(device, local, pair.w @ pose[:3, :3])
+
+
+def _panel_shifts(pair: PairGeometry) -> tuple[Array, Array]:
+    """Return the same of the projector's panel, across the ring surfaces."""
+    pose = pair.projector.world_from_device
+    local = in_frame(pose, pair.points)
+    return pair.projector.light.panel_shifts(local, pair.m @ pose[:3, :3])
