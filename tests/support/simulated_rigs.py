@@ -11,6 +11,7 @@ from planning.model.calibration_errors import CalibrationErrors
 
 # Turn about the device's axes, displacement along them, focal length, principal point.
 ONE_EACH = np.eye(9)
+_SETTLED = 1e-8
 
 
 def scales(errors: CalibrationErrors):
@@ -42,7 +43,8 @@ def off_by(device, error):
 def triangulated(points, projector, camera, true_projector, true_camera, noise_px=0.0):
     """Return where a rig taken to be as planned puts points that the true one sees.
 
-    Each on its viewing ray, by Newton's method, where the ring is that lit it.
+    Each on its viewing ray, by Newton's method, where the ring is that lit it; NaN
+    where the ray passes that ring by.
     """
     source, error = true_projector
     drawn = _drawn(projector, source, error, points)
@@ -52,11 +54,15 @@ def triangulated(points, projector, camera, true_projector, true_camera, noise_p
     pose = camera.world_from_device
     rays = camera.device.rays(pixels + noise_px) @ pose[:3, :3].T
     reach = np.linalg.norm(points - pose[:3, 3], axis=1)
-    for _ in range(20):
-        there, step = pose[:3, 3] + reach[:, None] * rays, 1e-6
+    step, most = 1e-6, 5e-3
+    for _ in range(30):
+        there = pose[:3, 3] + reach[:, None] * rays
         miss = _coordinate(projector, there) - ring
-        slope = _coordinate(projector, there + step * rays) - ring - miss
-        reach = reach - step * miss / slope
+        slope = (_coordinate(projector, there + step * rays) - ring - miss) / step
+        with np.errstate(divide="ignore", invalid="ignore"):
+            last = np.nan_to_num(miss / slope)
+        reach = reach - np.clip(last, -most, most)
+    reach[np.abs(last) > _SETTLED] = np.nan
     return pose[:3, 3] + reach[:, None] * rays
 
 
