@@ -16,7 +16,15 @@ from planning.scene.patterns import pattern_of
 from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.predicates.audit_devices import AuditCamera, AuditProjector
 from planning.verify.audit.predicates.error_terms import PairGeometry, error_terms
+from planning.verify.reconstruction.calibration import (
+    calibrate_camera,
+    calibrate_projector,
+)
+from planning.verify.reconstruction.check.calibration_sigma import calibration_sigma
+from planning.verify.reconstruction.cloud import Cloud
+from planning.verify.reconstruction.scanner import Scanner
 
+BLANK = Scanner((), (), None, None, None, None)
 # Of the first order alone, differences are exact to a share of about this.
 SMALL = 1e-2
 ERRORS = CalibrationErrors(np.radians(0.02), 5e-5, 2e-4, 0.3)
@@ -80,8 +88,28 @@ def test_each_term_is_what_rigs_that_are_off_do(light, point, normal, position, 
             *(np.ones(1, dtype=bool), np.ones(1)),
         ),
     )
+    cloud = _seen_by(source, camera, target)
+    scanner = replace(
+        BLANK,
+        projectors=(calibrate_projector(source),),
+        cameras=(calibrate_camera(camera),),
+        calibration=errors,
+    )
+    sigma = calibration_sigma(cloud, target.samples.normals, scanner)
+    assert sigma == pytest.approx(np.hypot(*truth), rel=1e-3)
+
     for name, term in error_terms(pair, limits).items():
         assert term == pytest.approx(quality.terms[name], rel=1e-5)
+
+
+def _seen_by(source, camera, target):
+    """The point as a cloud; the checker reads of it where it is and was seen."""
+    eye, points = calibrate_camera(camera), target.samples.points
+    rays = points - eye.centre
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    index, one = np.zeros(1, dtype=np.int16), np.ones(1)
+    where = points, rays, rays, eye.project(points)
+    return Cloud(*where, index, index, index, one, rays, one, one)
 
 
 def test_noise_alone_is_limited_where_that_is_asked():

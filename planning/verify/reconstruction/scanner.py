@@ -7,6 +7,7 @@ from typing import Self
 import numpy as np
 
 from geometry.mesh.mesh import TriangleMesh
+from planning.model.calibration_errors import CalibrationErrors
 from planning.model.obstacles import Obstacle
 from planning.model.plan import RigPlan
 from planning.model.requirements import CheckLimits
@@ -113,6 +114,7 @@ class Scanner:
         baselines: Of pairs of cameras that eq. (10) limits.
         obstacles: What stands about the object and isn't a device.
         digest: Of the plan; empty where there is none.
+        calibration: What its calibration leaves of each device; None: nobody says.
     """
 
     projectors: tuple[ProjectorCalibration, ...]
@@ -127,6 +129,7 @@ class Scanner:
     baselines: tuple[BaselineLimit, ...] = ()
     obstacles: tuple[Obstacle, ...] = ()
     digest: str = ""
+    calibration: CalibrationErrors | None = None
 
     @classmethod
     def of(cls, plan: RigPlan) -> Self:
@@ -155,6 +158,7 @@ class Scanner:
             ),
             plan.surface.obstacles,
             plan.digest,
+            wanted.triangulation.calibration,
         )
 
     def pairs(self) -> Iterator[tuple[tuple[int, int], PairCalibration]]:

@@ -92,7 +92,8 @@ def plate_map(limits_m=None, align="none"):
 
 def merged_as(cloud: Cloud, normals: np.ndarray) -> Merged:
     every, none = np.ones(len(cloud), dtype=bool), np.zeros(len(cloud), dtype=bool)
-    return Merged(cloud, every, none, none, normals, np.full(len(cloud), 1e-5))
+    even = np.full(len(cloud), 1e-5)
+    return Merged(cloud, every, none, none, normals, even, 0.0 * even)
 
 
 class _Limits:

@@ -116,9 +116,9 @@ class CloudFile:
         normal could give: the length of the point's move with its edge, times the
         edge's noise.
         """
-        sigma = _sigma(merged) / unit.in_m
+        columns = _columns(merged.cloud.points, merged.normals, merged, unit)
+        sigma = columns["sigma"].astype(float)
         low, high = np.quantile(sigma, _ENDS).tolist() if len(sigma) else (0.0, 1.0)
-        columns = _columns(merged.cloud.points, merged.normals, sigma, unit)
         return cls._coloured(columns, unit, _BY_SIGMA, (low, high), digest)
 
     @classmethod
@@ -132,8 +132,7 @@ class CloudFile:
         away = deviation.distances / unit.in_m
         widest = float(np.quantile(np.abs(away), _WIDEST))
         low, high = deviation.limits_m or (-widest * unit.in_m, widest * unit.in_m)
-        sigma = _sigma(merged) / unit.in_m
-        columns = _columns(deviation.points, deviation.normals, sigma, unit)
+        columns = _columns(deviation.points, deviation.normals, merged, unit)
         columns["deviation"] = away.astype("<f4")
         limits = low / unit.in_m, high / unit.in_m
         pose = deviation.mesh_from_measured[:3].ravel().tolist()
@@ -201,20 +200,25 @@ class CloudFile:
         file.write(self.rows.tobytes())
 
 
-def _sigma(merged: Merged) -> Array:
-    """Standard deviations along the normal, without one the largest, (n,) [m]."""
+def _noise(merged: Merged) -> Array:
+    """Standard deviations of noise along the normal, without one the largest [m]."""
     cloud = merged.cloud
     largest = np.linalg.norm(cloud.shift, axis=1) * cloud.noise_px
     return np.where(np.isfinite(merged.normals[:, 0]), merged.sigma, largest)
 
 
 def _columns(
-    points: Array, normals: Array, sigma: Array, unit: LengthUnit
+    points: Array, normals: Array, merged: Merged, unit: LengthUnit
 ) -> dict[str, NDArray[Any]]:
+    """Positions, normals and sigma; its parts where a calibration is stated."""
     normals = np.where(np.isfinite(normals), normals, 0.0)
     columns = {name: points[:, k] / unit.in_m for k, name in enumerate("xyz")}
     columns |= {f"n{name}": normals[:, k].astype("<f4") for k, name in enumerate("xyz")}
-    return columns | {"sigma": sigma.astype("<f4")}
+    noise, calibration = _noise(merged), merged.calibration
+    sigmas = {"sigma": np.hypot(noise, calibration)}
+    if np.any(calibration > 0.0):
+        sigmas |= {"sigma_noise": noise, "sigma_calibration": calibration}
+    return columns | {k: (v / unit.in_m).astype("<f4") for k, v in sigmas.items()}
 
 
 def is_cloud(path: Path) -> bool:

@@ -17,6 +17,7 @@ from planning.verify.reconstruction.decode.decode import PairIndex
 from planning.verify.reconstruction.decode.lit_image import LitImage
 from planning.verify.reconstruction.scanner import Scanner
 
+from .calibration_sigma import calibration_sigma
 from .overlaps import compare_overlaps, pixel_sizes
 from .ring_curves import RingCurves
 from .tiles import Tiles, plane_normals
@@ -45,7 +46,9 @@ class Merged:
         steps: Which are left out as edges between surfaces, shape (n_all,).
         shared: Which lie where two projectors' light shows, shape (n_all,).
         normals: By the points around, towards the camera; NaN: too few, shape (n, 3).
-        sigma: Standard deviation of each point along its normal [m]; NaN likewise.
+        sigma: Standard deviation of each point along its normal, of noise [m]; NaN
+            likewise.
+        calibration: That of what the calibration leaves [m], shape (n,); 0: not stated.
     """
 
     cloud: Cloud
@@ -54,6 +57,7 @@ class Merged:
     shared: Mask
     normals: Array
     sigma: Array
+    calibration: Array
 
     def joined(self, other: "Merged") -> "Merged":
         """Return the points of both, of sequences that measured different places."""
@@ -117,9 +121,9 @@ def merge(
             side_m = side_px * float(np.median(size[some]))
             cell = _cells(fitted.points[some], kind[some], side_m)
             stays[some] = _sure(cell, source[some], sigma[some], ratio)
-    return Merged(
-        fitted.take(stays), stays, steps, shared, normals[stays], sigma[stays]
-    )
+    left_over, normals = fitted.take(stays), normals[stays]
+    calibration = calibration_sigma(left_over, normals, plan)
+    return Merged(left_over, stays, steps, shared, normals, sigma[stays], calibration)
 
 
 def _sharpness(cloud: Cloud) -> Array:
