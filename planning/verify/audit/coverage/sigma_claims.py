@@ -69,7 +69,11 @@ def _audit_terms(
     below: AuditFindings,
 ) -> None:
     """Check each term's root mean square, by the spread of its square over samples."""
-    below.same("terms_rms_m", sorted(claimed), sorted(terms), "the rig's")
+    below.holds(
+        set(claimed) == set(terms),
+        "terms_rms_m",
+        f"names {', '.join(sorted(claimed))}; limits: {', '.join(sorted(terms))}",
+    )
     for name in set(terms) & set(claimed):
         square = terms[name] ** 2
         error = np.std(square) * np.sqrt(1.0 / len(square) + 1.0 / max(n_claimed, 1))
