@@ -214,7 +214,6 @@ class CalibrationTable(Table):
     position_mm: Annotated[float, Field(ge=0.0)] = 0.0
     focal_percent: Annotated[float, Field(ge=0.0, le=20.0)] = 0.0
     principal_px: Annotated[float, Field(ge=0.0)] = 0.0
-    sources: dict[str, Name] = Field(default={})
 
     def errors(self) -> CalibrationErrors | None:
         """Return them in metres, radians and shares; None: nothing is left."""

@@ -16,6 +16,13 @@ n_candidate_projectors = 30
 n_candidate_cameras = 30
 n_reference_projectors = 600
 n_reference_cameras = 400
+[limits]
+ring_sigma_mm = 0.01
+[calibration]
+angle_deg = 0.005
+position_mm = 0.01
+focal_percent = 0.005
+principal_px = 0.1
 """
 
 
@@ -49,19 +56,48 @@ def test_the_claim_is_what_the_audit_finds(plan):
     assert audit_plan(plan, n_samples=4000).failures == ()
 
 
-@pytest.mark.parametrize("name", ["median_m", "p95_m"])
-@pytest.mark.parametrize("factor", [0.7, 1.4, np.nan])
-def test_a_false_prediction_is_found(plan, name, factor):
-    def change(document):
-        value = document["coverage"]["sigma"][name]
-        document["coverage"]["sigma"][name] = value * factor
+FIGURES = [
+    *(("median_m",), ("p95_m",), ("noise_median_m",), ("noise_p95_m",)),
+    *(("terms_rms_m", term) for term in ("edges", "rings", "camera", "projector")),
+]
 
-    if np.isnan(factor):
-        with pytest.raises(ValueError, match="sigma"):
-            failures(plan, change)
-        return
+
+@pytest.mark.parametrize("path", FIGURES, ids=".".join)
+@pytest.mark.parametrize("factor", [0.7, 1.4])
+def test_a_false_prediction_is_found(plan, path, factor):
+    def change(document):
+        where = document["coverage"]["sigma"]
+        for key in path[:-1]:
+            where = where[key]
+        where[path[-1]] *= factor
+
     (failure,) = failures(plan, change)
-    assert failure.startswith(f"coverage.sigma.{name}")
+    assert failure.startswith(f"coverage.sigma.{'.'.join(path)}")
+
+
+@pytest.mark.parametrize("name", ["median_m", "noise_p95_m"])
+def test_a_prediction_that_is_no_number_is_refused(plan, name):
+    def change(document):
+        document["coverage"]["sigma"][name] = np.nan
+
+    with pytest.raises(ValueError, match="sigma"):
+        failures(plan, change)
+
+
+def test_terms_that_the_limits_lack_or_have_beside_are_found(plan):
+    def without(document):
+        del document["coverage"]["sigma"]["terms_rms_m"]["camera"]
+
+    (failure,) = failures(plan, without)
+    assert "limits: camera, edges, projector, rings" in failure
+
+
+def test_terms_add_up_and_the_limit_is_of_all(plan):
+    sigma = plan.coverage.sigma
+    assert set(sigma.terms_rms_m) == {"edges", "rings", "camera", "projector"}
+    assert sigma.noise_median_m < sigma.median_m
+    assert sigma.noise_p95_m < sigma.p95_m
+    assert sigma.p95_m <= plan.requirements.triangulation.max_sigma_m
 
 
 def test_no_prediction_of_what_is_measured_is_found(plan):
@@ -71,8 +107,19 @@ def test_no_prediction_of_what_is_measured_is_found(plan):
     assert "null, but the target is measured" in failures(plan, change)[0]
 
 
-def test_it_is_told_with_its_limit(plan):
+def test_noise_and_calibration_are_told_apart(plan):
     sigma = plan.coverage.sigma
-    (line,) = [line for line in coverage_lines(plan) if "predicted sigma" in line]
-    assert f"median {1e3 * sigma.median_m:.3f} mm" in line
-    assert line.endswith("(limit 0.3)")
+    alone, whole = (line for line in coverage_lines(plan) if "median" in line)
+    assert "edge noise alone" in alone
+    assert f"median {1e3 * sigma.noise_median_m:.3f} mm" in alone
+    assert f"median {1e3 * sigma.median_m:.3f} mm" in whole
+    assert "(limit 0.3); rms by term edges" in whole
+
+    bare = plan.to_document()
+    bare["requirements"]["triangulation"]["calibration"] = None
+    (line,) = (
+        line
+        for line in coverage_lines(RigPlan.from_document(bare, plan.surface))
+        if "median" in line
+    )
+    assert line.endswith("(limit 0.3); the rig states no [calibration]")

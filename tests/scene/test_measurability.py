@@ -191,6 +191,7 @@ def test_the_first_limit_that_fails_is_named_in_order():
     quality = pair_limits.PairQuality(
         np.array([0.05, 0.5, 0.5, 0.5, np.nan]),
         np.array([9.0, 9.0, 1e-4, 1e-4, 1e-4]),
+        {},
         np.array([0.1, 0.1, 0.1, 9.0, 9.0]),
         *(None, None),
     )
