@@ -15,7 +15,6 @@ from planning.cameras.camera_cover import (
 from planning.cameras.camera_routes import cheapest, widest_routes
 from planning.cameras.camera_stage import CameraSolution, follow_cameras
 from planning.cameras.proved_cameras import CameraStage, bound_stage
-from planning.model.acquisition import pixels_read
 from planning.model.document.certificates import Certificate
 from planning.model.document.device_records import RingAxis
 from planning.model.errors import InfeasibleLimitsError
@@ -32,6 +31,7 @@ from planning.report.advice.standing_inside import standing_inside
 from planning.report.advice.what_helps import falls_short
 from planning.report.partial_plan import PartialPlan, Prepared
 from planning.report.region_claims import below_floor
+from planning.rings.acquisition import pixels_read
 from planning.rings.ring_stage import space_rings
 from planning.scene.draws import DRAWS
 

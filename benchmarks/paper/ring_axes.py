@@ -22,7 +22,7 @@ import numpy as np
 from benchmarks.bounds.continuous_bounds import jobs
 from geometry.files.readers import load_mesh
 from planning import RequirementError, RigPlan, load_rig, plan_rig
-from planning.model.acquisition import n_frames
+from planning.rings.acquisition import n_frames
 from planning.verify.audit.audit import audit_plan
 
 AXES = ("free", "centred", "auto")

@@ -9,10 +9,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from planning.model.acquisition import pixels_read
 from planning.model.document.certificates import CamerasBy
 from planning.model.document.device_records import AxisTaken, RingAxis
 from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.rings.acquisition import pixels_read
 from planning.rings.axis_moves import move_ring_axes
 from planning.rings.centred_axes import centred_axes
 from planning.rings.idle_rings import without_idle

@@ -9,20 +9,9 @@ from pydantic_core import ErrorDetails
 
 from geometry.arrays import Array
 
+from .shares import percent_as_share
+
 Positive = Annotated[float, Field(gt=0.0)]
-
-
-def percent_as_share(value: object) -> object:
-    """Return 0.95 for "95 %", and anything else as it is.
-
-    Raises:
-        ValueError: If what stands before the sign isn't a number.
-    """
-    if isinstance(value, str) and value.endswith("%"):
-        return float(value[:-1]) / 100.0
-    return value
-
-
 Share = Annotated[float, BeforeValidator(percent_as_share), Field(gt=0.0, le=1.0)]
 ShareOrNone = Annotated[float, BeforeValidator(percent_as_share), Field(ge=0.0, le=1.0)]
 Acute = Annotated[float, Field(gt=0.0, lt=90.0)]

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from geometry.devices import PinholeModel
-from planning.model.acquisition import frame_time, n_frames, pixels_read
 from planning.model.document.device_records import (
     CreasesRecord,
     ProjectorRecord,
@@ -16,6 +15,7 @@ from planning.model.document.input_records import RigRecord
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.report.entries.cost_entry import cost_record
 from planning.report.summary.check_lines import cost_lines
+from planning.rings.acquisition import frame_time, n_frames, pixels_read
 from planning.verify.reconstruction.light_laws import LIGHTS
 from planning.verify.reconstruction.patterns.ring_patterns import DrawnRings
 

@@ -3,10 +3,10 @@
 from collections.abc import Mapping, Sequence
 from math import prod
 
-from planning.model.acquisition import frame_time, n_frames
 from planning.model.document.device_records import CameraRecord, ProjectorRecord
 from planning.model.document.input_records import RigRecord
 from planning.model.document.plan_document import CostRecord
+from planning.rings.acquisition import frame_time, n_frames
 
 # What places light, with what that needs to know of the surface, is t4. All the rest of
 # planning is t5. The check is neither: t1 to t3 are of a scan, not of planning.

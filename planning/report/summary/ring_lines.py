@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planning.model.acquisition import n_frames
 from planning.model.document.device_records import (
     OtherRings,
     ProjectorRecord,
@@ -14,6 +13,7 @@ from planning.model.document.device_records import (
 from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
 from planning.model.words import labelled, percent
+from planning.rings.acquisition import n_frames
 from planning.rings.ring_stage import tolerance_m
 
 # As many of the chords between rings may err by more than was asked.
