@@ -1,5 +1,7 @@
 """What a plan predicts of the standard deviation of its points."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.handmade import tampered
@@ -8,6 +10,9 @@ from support.plain_shapes import box
 from planning import RequirementError, RigPlan, load_rig, plan_rig
 from planning.report.summary.coverage_lines import coverage_lines
 from planning.verify.audit.audit import audit_plan
+from planning.verify.audit.audit_case import AuditCase, examine
+from planning.verify.audit.audit_findings import AuditFindings
+from planning.verify.audit.coverage.sigma_claims import audit_sigma
 
 RIG = """
 base = "default"
@@ -44,9 +49,21 @@ def plan(tmp_path_factory) -> RigPlan:
         return missed.plan
 
 
-def failures(plan: RigPlan, change) -> list[str]:
-    found = audit_plan(tampered(plan, change), n_samples=4000).failures
-    return [failure for failure in found if "sigma" in failure]
+@pytest.fixture(scope="module")
+def case(plan) -> AuditCase:
+    return examine(plan, seed=0, n_samples=4000, threads=1)
+
+
+@pytest.fixture
+def failures(plan, case):
+    """What the audit of these claims finds of a plan that was tampered with."""
+
+    def found(change) -> tuple[str, ...]:
+        findings = AuditFindings()
+        audit_sigma(replace(case, plan=tampered(plan, change)), findings)
+        return findings.failures
+
+    return found
 
 
 def test_the_claim_is_what_the_audit_finds(plan):
@@ -64,31 +81,31 @@ FIGURES = [
 
 @pytest.mark.parametrize("path", FIGURES, ids=".".join)
 @pytest.mark.parametrize("factor", [0.7, 1.4])
-def test_a_false_prediction_is_found(plan, path, factor):
+def test_a_false_prediction_is_found(failures, path, factor):
     def change(document):
         where = document["coverage"]["sigma"]
         for key in path[:-1]:
             where = where[key]
         where[path[-1]] *= factor
 
-    (failure,) = failures(plan, change)
+    (failure,) = failures(change)
     assert failure.startswith(f"coverage.sigma.{'.'.join(path)}")
 
 
 @pytest.mark.parametrize("name", ["median_m", "noise_p95_m"])
-def test_a_prediction_that_is_no_number_is_refused(plan, name):
+def test_a_prediction_that_is_no_number_is_refused(failures, name):
     def change(document):
         document["coverage"]["sigma"][name] = np.nan
 
     with pytest.raises(ValueError, match="sigma"):
-        failures(plan, change)
+        failures(change)
 
 
-def test_terms_that_the_limits_lack_or_have_beside_are_found(plan):
+def test_terms_that_the_limits_lack_or_have_beside_are_found(failures):
     def without(document):
         del document["coverage"]["sigma"]["terms_rms_m"]["camera"]
 
-    (failure,) = failures(plan, without)
+    (failure,) = failures(without)
     assert "limits: camera, edges, projector, rings" in failure
 
 
@@ -100,11 +117,11 @@ def test_terms_add_up_and_the_limit_is_of_all(plan):
     assert sigma.p95_m <= plan.requirements.triangulation.max_sigma_m
 
 
-def test_no_prediction_of_what_is_measured_is_found(plan):
+def test_no_prediction_of_what_is_measured_is_found(failures):
     def change(document):
         document["coverage"]["sigma"] = None
 
-    assert "null, but the target is measured" in failures(plan, change)[0]
+    assert "null, but the target is measured" in failures(change)[0]
 
 
 def test_noise_and_calibration_are_told_apart(plan):
