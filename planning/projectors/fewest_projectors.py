@@ -1,11 +1,13 @@
 """The search for the fewest projectors, until samples that are fresh confirm them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.planned import PlannedProjector
 from planning.proofs.quotas import Quotas, RegionFloors
 from planning.proofs.selection import Selection, select_fewest
 from planning.scene.draws import DRAWS
@@ -60,7 +62,8 @@ class Search:
             candidates, selection = self._between(
                 candidates, begun, before.selection.needed, thorough=first
             )
-            confirmed = confirms(candidates, selection.chosen, draw)
+            chosen = candidates.of(selection.chosen)
+            confirmed = confirms(candidates, chosen, draw)
             if confirmed or selection.status == "infeasible" or last:
                 return Found(candidates, selection, draw, confirmed)
             fresh = candidates.scene.target_samples(DRAWS.fresh_projectors.later(draw))
@@ -77,7 +80,8 @@ class Search:
         if not quotas.floors.any():
             return floored
         met = found.confirmed and candidates.cover.enough(chosen.chosen)
-        if met and confirms(candidates, chosen.chosen, found.draws):
+        poses = candidates.of(chosen.chosen)
+        if met and confirms(candidates, poses, found.draws):
             return replace(floored, selection=replace(chosen, floors=quotas))
         return self.fewest(floored)
 
@@ -135,10 +139,13 @@ class Search:
         return candidates, selection
 
 
-def confirms(candidates: CandidateSet, chosen: NDArray[np.int64], draw: int) -> bool:
-    """Return whether those chosen light enough of samples that are fresh.
+def confirms(
+    candidates: CandidateSet, projectors: Sequence[PlannedProjector], draw: int
+) -> bool:
+    """Return whether projectors light enough of samples that are fresh.
 
-    Of all by a draw of the target; of regions by that and more samples of them.
+    Of what they and the candidates reach: of all by a draw of the target, of regions by
+    that and more samples of them.
     """
     scene = candidates.scene
     samples = scene.target_samples(DRAWS.fresh_projectors.later(draw))
@@ -146,7 +153,7 @@ def confirms(candidates: CandidateSet, chosen: NDArray[np.int64], draw: int) -> 
     more = scene.more_of_regions(samples, DRAWS.fresh_regions.later(draw))
     if scene.requirements.region_coverage and more is not None:
         samples = merged(samples, more)
-    lit = CandidateSet.over(scene, samples, candidates.of(chosen)).reached
+    lit = CandidateSet.over(scene, samples, tuple(projectors)).reached
     reached, dark = lit.copy(), samples.take(~lit)
     reached[~lit] = CandidateSet.over(scene, dark, candidates.projectors).reached
     share = scene.requirements.dominant_coverage

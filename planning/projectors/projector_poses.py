@@ -23,6 +23,7 @@ from planning.scene.workspace.mount_settings import settable
 from solvers.poses.pose_problem import PoseProgram, pose_margins
 from solvers.poses.pose_program import pose_slack, solve_pose
 
+from .fewest_projectors import confirms
 from .projector_stage import ProjectorStage
 from .share_margin import lit_by_any, margin_at_share, to_keep, widest_between
 
@@ -37,6 +38,8 @@ _MAX_MOVE_M = 0.3
 _SEARCHED = 2000
 # Of the samples that candidates reach: so many others a pose may light.
 _STRAY = 0.002
+# Draw of samples that no cover saw.
+_CONFIRMING = 9
 
 
 def widen_margins(scene: Scene, stage: ProjectorStage) -> tuple[PlannedProjector, ...]:
@@ -49,7 +52,8 @@ def widen_margins(scene: Scene, stage: ProjectorStage) -> tuple[PlannedProjector
     way is tried, then half, then a quarter, and a move that lowers the margin at the
     share isn't taken, nor one that leaves too few samples lit, of all or of a region
     with a floor, nor one that lights what no candidate does: what is required, and was
-    proved, is a share of what they cover.
+    proved, is a share of what they cover. Fresh samples confirm the end; where they
+    deny it and not the beginning, nothing is moved.
     """
     samples, reached = stage.candidates.samples, stage.candidates.reached
     state = _Lit(scene, samples, list(stage.projectors), reached)
@@ -69,7 +73,11 @@ def widen_margins(scene: Scene, stage: ProjectorStage) -> tuple[PlannedProjector
         ]
         if not any(moved):
             break
-    return tuple(state.projectors)
+    # Margins fitted to few samples may be paid for by others.
+    wider, chosen = tuple(state.projectors), stage.projectors
+    held = confirms(stage.candidates, wider, _CONFIRMING)
+    lost = not held and confirms(stage.candidates, chosen, _CONFIRMING)
+    return chosen if lost else wider
 
 
 def _between(state: "_Lit", quotas: Quotas, kept: Quotas, n_lattice: int) -> "_Lit":

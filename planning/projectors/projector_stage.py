@@ -106,7 +106,7 @@ def plan_projectors(
     candidates, selection = found.candidates, found.selection
     if found.confirmed and selection.status != "infeasible":
         wider = _with_widest_margin(candidates, selection)
-        held = confirms(candidates, wider.chosen, found.draws)
+        held = confirms(candidates, candidates.of(wider.chosen), found.draws)
         selection = wider if held else selection
     return ProjectorStage.over(candidates, selection)
 

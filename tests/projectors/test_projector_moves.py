@@ -80,6 +80,21 @@ def test_no_move_ends_in_shadow(shaded):
     assert gained > np.radians(2.0)
 
 
+def test_moves_that_fresh_samples_deny_are_undone(shaded, monkeypatch):
+    scene, stage = shaded
+    chosen = stage.projectors
+
+    def confirms(_, projectors, draw):
+        return projectors == chosen
+
+    monkeypatch.setattr("planning.projectors.projector_poses.confirms", confirms)
+    assert widen_margins(scene, stage) == chosen
+    monkeypatch.setattr(
+        "planning.projectors.projector_poses.confirms", lambda *_: False
+    )
+    assert widen_margins(scene, stage) != chosen
+
+
 def test_moves_reach_no_more_than_what_was_proved_is_a_share_of():
     """Parallel light from a cone of 40 degrees: turned beams would reach round a ball.
 

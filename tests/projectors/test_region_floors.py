@@ -92,9 +92,9 @@ def test_fresh_samples_confirm_the_total_and_every_floor():
     chosen = np.arange(2) + len(stage.candidates.projectors)
     required = replace(scene.requirements, region_coverage=0.5)
     floored = replace(candidates, scene=replace(scene, requirements=required))
-    assert confirms(candidates, chosen, 5)
-    assert not confirms(floored, chosen, 5)
-    assert not confirms(candidates, chosen[:1], 5)
+    assert confirms(candidates, candidates.of(chosen), 5)
+    assert not confirms(floored, candidates.of(chosen), 5)
+    assert not confirms(candidates, candidates.of(chosen[:1]), 5)
 
 
 def test_a_floor_costs_a_projector_and_both_bounds_say_so():
