@@ -14,6 +14,7 @@ from geometry.poses import look_at
 from geometry.shapes.primitives import sphere
 from planning.cameras.camera_cover import camera_candidate_views, plan_cameras
 from planning.cameras.proved_cameras import bound_stage, camera_stage
+from planning.model.calibration_errors import CalibrationErrors
 from planning.model.document.certificates import (
     BestArea,
     CandidateBound,
@@ -264,27 +265,41 @@ def _rotations(source, target, rng):
     return frames[1] @ np.swapaxes(frames[0], -1, -2)
 
 
+# What each error by itself takes from the accuracy, and all of them from half of it.
+OFF = [
+    CalibrationErrors(angle=2e-4),
+    CalibrationErrors(position_m=2e-4),
+    CalibrationErrors(focal=1e-4),
+    CalibrationErrors(principal_px=0.6),
+    CalibrationErrors(1e-4, 1e-4, 5e-5, 0.2),
+]
+
+
 @pytest.mark.parametrize("name", ["plain", "bent"])
 @pytest.mark.parametrize(
-    ("limit", "value"), [*TIGHT.items(), ("min_ring_pitch_px", 40.0)]
+    ("limit", "value", "off"),
+    [
+        *[(name, value, None) for name, value in TIGHT.items()],
+        ("min_ring_pitch_px", 40.0, None),
+        *[("max_sigma_m", 3e-4, errors) for errors in OFF],
+    ],
 )
-def test_what_any_place_and_aim_measures_is_admitted(limit, value, name):
+def test_what_any_place_and_aim_measures_is_admitted(limit, value, off, name):
     """Each limit alone, for cells of up to 20 degrees; light and rings at random.
 
     Rings 40 px apart in the image are those seen along the ring: pitch has no bound.
     """
+    errors = off or CalibrationErrors()
     device, rng, n, tries = LENSES[name], np.random.default_rng(7), 200, 300
     rows = everything_lit(scene_of(sphere(0.1, subdivisions=3)), n)
     m = rng.normal(size=(n, 3))
     m /= np.linalg.norm(m, axis=1)[:, None]
     spacing, cosine = rng.uniform(1e-3, 6e-3, n), rng.uniform(0.5, 1.0, n)
     light = replace(rows.lights[0], incidence_cos=cosine)
-    rows = replace(
-        rows,
-        lights=(light,),
-        surfaces=(CodeSurfaces(m, spacing, np.zeros((len(m), 3))),),
-    )
-    required = scene_of(sphere(0.1), limits=FREE | {limit: value}).requirements
+    levers = rng.uniform([0.0, 0.0, 0.0], [1.5, 0.6, 1e-3], (n, 3))
+    rows = replace(rows, lights=(light,), surfaces=(CodeSurfaces(m, spacing, levers),))
+    limits = FREE | {limit: value, "calibration": off}
+    required = scene_of(sphere(0.1), limits=limits).requirements
     normals = rows.target.samples.normals
     towards = _turned_by(normals, np.radians(rng.uniform(0, 85, n)), rng)
     psi, far = rng.uniform(0.0, 0.35, n), rng.uniform(0.95, 1.4, n)
@@ -302,11 +317,22 @@ def test_what_any_place_and_aim_measures_is_admitted(limit, value, name):
     facing = np.einsum("ij,ikj->ik", normals, u)
     along = np.abs(np.einsum("ij,ikj->ik", m, u))
     v = np.cross(-u, np.cross(normals, m)[:, None])
-    g = np.linalg.norm(np.einsum("ikab,ika->ikb", jacobian, v), axis=2)
+    turned = np.einsum("ikab,ika->ikb", jacobian, v)
+    g = np.linalg.norm(turned, axis=2)
+    # Variances of v.dX and m.dY: a third of a turn's square, half of a shift's.
+    longer = (turned * (pixel - device.camera_matrix[:2, 2])).sum(axis=2)
+    ray = (errors.angle**2 * t**2 + errors.position_m**2) / 3.0 * (v**2).sum(axis=2)
+    ray += t**2 * (errors.focal * longer) ** 2
+    ray += t**2 * (errors.principal_px * g) ** 2 / 2.0
+    by_turn, by_scale, by_shift = np.square(levers.T)
+    surface = errors.angle**2 * by_turn / 3.0 + errors.position_m**2 / 3.0
+    surface += errors.focal**2 * by_scale + errors.principal_px**2 * by_shift / 2.0
+    edges = (0.1 / cosine[:, None] * t * g) ** 2
+    sigma = np.sqrt(edges + ray + surface[:, None] * facing**2)
     with np.errstate(divide="ignore"):
         good = {
             "min_conditioning": along >= value,
-            "max_sigma_m": 0.1 / cosine[:, None] * t * g / along <= value,
+            "max_sigma_m": sigma / along <= value,
             "min_ring_pitch_px": spacing[:, None] * facing >= value * t * g,
             "max_sample_distance_m": t * local[:, :, 2]
             <= value * device.focal_px * facing,

@@ -55,7 +55,7 @@ class MeasurableCells:
         self._spacing = np.stack([ring.spacing for ring in samples.surfaces])
         cosines = np.stack([light.incidence_cos for light in samples.lights])
         errors = self._pair.limited_calibration
-        # A turn by 1 rad moves a ray by 1 / least_turn pixels at most.
+        # So that times the least |g|, least_turn |v|, a turn moves a ray by |v|.
         turned = errors.about_axis / self._image.least_turn
         edge = self._pair.noise_px / np.maximum(cosines, 1e-9)
         self._noise = np.sqrt(edge**2 + turned**2 + errors.along_line_px**2)
