@@ -21,6 +21,7 @@ from planning.cli.declared.other_declared import (
 )
 from planning.cli.declared.plan_declared import rig_command
 from planning.cli.declared.reconstruct_declared import reconstruct
+from planning.cli.declared.tolerance_declared import tolerance
 
 from .console import stop, stop_signals
 
@@ -84,6 +85,8 @@ def commands() -> None:
     plan evaluate face.obj --poses rig.csv    what a rig measures as it stands
     plan verify face-plan/plan.json           recomputes every claim, checks again
     plan show face-plan/plan.json             every place in mesh axes, camera by camera
+    plan tolerance face-plan --mount 2mm,0.2deg
+                                              how well devices must be mounted
     plan lens --mesh face.obj                 which lens and focus suit an object
     plan reconstruct face-plan/plan.json      a cloud from rendered or captured images
 
@@ -93,7 +96,7 @@ def commands() -> None:
 
 
 for _command in (
-    *(rig_command, evaluate, verify, show, reconstruct),
+    *(rig_command, evaluate, verify, show, reconstruct, tolerance),
     *(lens, rigs, schema, sample),
 ):
     commands.add_command(_command)

@@ -1,4 +1,4 @@
-"""What a calibration leaves: how far each device isn't where it is taken to be."""
+"""How far devices aren't where they should be, and where they are taken to be."""
 
 from dataclasses import dataclass
 from math import sqrt
@@ -40,3 +40,27 @@ class CalibrationErrors:
 
 
 PERFECT = CalibrationErrors()
+
+
+@dataclass(frozen=True)
+class Mounting:
+    """How far devices may stand beside their planned poses; known once calibrated.
+
+    Half widths, each uniformly distributed: a drawing gives a tolerance as bounds.
+
+    Attributes:
+        position_m: Of the displacement along each axis of the device [m].
+        angle: Of the rotation about each axis of the device [rad].
+        focal: Of the focal length, or of the panel's scale, as a share.
+    """
+
+    position_m: float = 0.0
+    angle: float = 0.0
+    focal: float = 0.0
+
+    def times(self, scale: float) -> "Mounting":
+        """Return bounds so many times as wide."""
+        return Mounting(scale * self.position_m, scale * self.angle, scale * self.focal)
+
+
+AS_PLANNED = Mounting()

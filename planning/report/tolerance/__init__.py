@@ -1,0 +1,1 @@
+"""What becomes of a plan's claims in rigs that aren't built exactly as planned."""
