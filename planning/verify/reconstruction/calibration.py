@@ -162,6 +162,15 @@ class ProjectorCalibration(DeviceCalibration):
         """
         return -np.einsum("ij,ij->i", self.aim(points)[1], normals)
 
+    @property
+    def ring_from_device(self) -> Array:
+        """Pose of the device in the ring frame [m], shape (4, 4)."""
+        turn = self.world_from_ring[:3, :3].T
+        pose = np.eye(4)
+        pose[:3, :3] = turn @ self.world_from_device[:3, :3]
+        pose[:3, 3] = turn @ (self.centre - self.world_from_ring[:3, 3])
+        return pose
+
     def to_ring(self, points: Array) -> Array:
         """Return world points (n, 3) in the ring frame."""
         return (points - self.world_from_ring[:3, 3]) @ self.world_from_ring[:3, :3]
@@ -176,11 +185,7 @@ class ProjectorCalibration(DeviceCalibration):
 
         (x/z, y/z) in diverging light, (x, y) in [m] in parallel light.
         """
-        turn = self.world_from_ring[:3, :3].T
-        ring_from_device = np.eye(4)
-        ring_from_device[:3, :3] = turn @ self.world_from_device[:3, :3]
-        ring_from_device[:3, 3] = turn @ (self.centre - self.world_from_ring[:3, 3])
-        return self.light.turned(self.panel_coordinates(pixels), ring_from_device)
+        return self.light.turned(self.panel_coordinates(pixels), self.ring_from_device)
 
     def panel(self, points: Array) -> tuple[Array, Array]:
         """Return pixels (n, 2) that light world points (n, 3), and depths z (n,).

@@ -32,6 +32,14 @@ class LightLaw:
         """Return the light p (n, 2) of frame a in frame b, its pose of shape (4, 4)."""
         return p @ b_from_a[:2, :2].T + b_from_a[:2, 3]
 
+    def turned_slopes(self, p: Array, slopes: Array, b_from_a: Array) -> Array:
+        """Return by light p (n, 2) of frame a what changes by slopes (n, 2) in b."""
+        return slopes @ b_from_a[:2, :2]
+
+    def plane_slopes(self, local: Array, slopes: Array) -> Array:
+        """Return by points (n, 3) what changes by slopes (n, 2) with their p."""
+        return np.column_stack([slopes, np.zeros(len(local))])
+
     def rays(self, p: Array, pose: Array) -> tuple[Array, Array]:
         """Return origins [m] and unit directions (n, 3) of light p of a posed frame."""
         starts = pose[:3, 3] + p @ pose[:3, :2].T
@@ -109,6 +117,14 @@ class _Diverging(LightLaw):
     def turned(self, p: Array, b_from_a: Array) -> Array:
         x, y, z = b_from_a[:3, :2] @ p.T + b_from_a[:3, 2:3]
         return np.column_stack([x / z, y / z])
+
+    def turned_slopes(self, p: Array, slopes: Array, b_from_a: Array) -> Array:
+        towards = np.column_stack([p, np.ones(len(p))]) @ b_from_a[:3, :3].T
+        return self.plane_slopes(towards, slopes) @ b_from_a[:3, :2]
+
+    def plane_slopes(self, local: Array, slopes: Array) -> Array:
+        along = -np.einsum("ij,ij->i", slopes, self.plane(local))
+        return np.column_stack([slopes, along]) / local[:, 2:]
 
     def rays(self, p: Array, pose: Array) -> tuple[Array, Array]:
         beams = p @ pose[:3, :2].T + pose[:3, 2]

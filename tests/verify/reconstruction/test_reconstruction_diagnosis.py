@@ -11,19 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 from support.reconstruction_rigs import changed
+from support.simulated_edges import simulated_edges
 
 from geometry.mesh.mesh import TriangleMesh
-from geometry.mesh.sampling import sample_surface
 from geometry.poses import look_at
-from geometry.rays.rays import RayCaster
 from planning.model.plan import RigPlan
-from planning.verify.reconstruction.calibration import (
-    calibrate_camera,
-    calibrate_projector,
-)
 from planning.verify.reconstruction.faults.cause_words import _two_digits, in_words
-from planning.verify.reconstruction.faults.diagnosis import diagnose
-from planning.verify.reconstruction.faults.supposed import Evidence
+from planning.verify.reconstruction.faults.diagnosis import Diagnosis, diagnose
+from planning.verify.reconstruction.faults.supposed import Evidence, Supposed
 from planning.verify.reconstruction.scanner import BaselineLimit, Scanner
 
 NOISE_PX = 0.02
@@ -40,45 +35,27 @@ def diverging(rigs) -> RigPlan:
     return rigs.small_rig(rigs.bumpy_sphere(0.05, subdivisions=4))
 
 
-def edges(plan: RigPlan, truth: RigPlan, *, outliers: float = 0.03) -> Evidence:
+def edges(plan: RigPlan, truth: RigPlan) -> Evidence:
     """Edges as a rig that really stands there gives them to who believes a plan."""
-    rng = np.random.default_rng(1)
-    mesh = truth.surface.mesh
-    caster = RayCaster(mesh, threads=1)
-    samples = sample_surface(mesh, 4000, seed=3)
-    parts = []
-    shining = {p.id: calibrate_projector(p) for p in truth.projectors}
-    standing = {c.id: calibrate_camera(c) for c in truth.cameras}
-    for p, planned in enumerate(plan.projectors):
-        design, device = calibrate_projector(planned), shining[planned.id]
-        to = samples.points - device.centre
-        if design.light.name == "parallel":
-            to = np.broadcast_to(device.axis, samples.points.shape)
-        lit = np.einsum("ij,ij->i", to, samples.normals) < 0.0
-        pixels, _ = device.panel(samples.points)
-        lit &= device.in_panel(pixels)
-        rho = np.hypot(*design.ring_plane(pixels).T)
-        for c, looking in enumerate(plan.cameras):
-            camera = standing[looking.id]
-            rays = samples.points - camera.centre
-            reach = np.linalg.norm(rays, axis=1)
-            rays /= reach[:, None]
-            seen = lit & (np.einsum("ij,ij->i", rays, samples.normals) < -0.2)
-            seen &= ~caster.occluded(camera.centre, rays, reach * (1 - 1e-5))
-            rows = rng.permutation(np.flatnonzero(seen))[:EDGES]
-            radii = rho[rows]
-            wrong = rng.random(len(rows)) < outliers
-            radii[wrong] *= rng.uniform(0.8, 1.2, wrong.sum())
-            where = camera.project(samples.points[rows])
-            where += NOISE_PX * rng.normal(size=where.shape)
-            noise = np.full(len(rows), NOISE_PX)
-            part = Evidence.at(where, p, c)
-            parts.append(replace(part, radii=radii, noise_px=noise))
-    return Evidence.join(parts)
+    supposed, stands = (Supposed.of(Scanner.of(one)) for one in (plan, truth))
+    ids = {"cameras": [c.id for c in plan.cameras]}
+    ids["projectors"] = [p.id for p in plan.projectors]
+    by_id = {
+        role: {device.id: device for device in getattr(stands, role)} for role in ids
+    }
+    order = {role: tuple(by_id[role][one] for one in ids[role]) for role in ids}
+    return simulated_edges(
+        supposed,
+        replace(stands, **order),
+        noise_px=NOISE_PX,
+        outliers=0.03,
+        most=EDGES,
+        seed=1,
+    )
 
 
 def said(plan: RigPlan, truth: RigPlan) -> list[str]:
-    causes = diagnose(Scanner.of(plan), edges(plan, truth))
+    causes = diagnose(Scanner.of(plan), edges(plan, truth)).causes
     return [in_words(cause, Scanner.of(plan)) for cause in causes]
 
 
@@ -111,8 +88,9 @@ def swap(document: dict[str, Any], key: str) -> None:
 
 
 def test_edges_of_a_rig_that_stands_as_planned_ask_for_nothing(plan):
-    assert diagnose(Scanner.of(plan), edges(plan, plan)) == ()
-    assert diagnose(Scanner.of(plan), edges(plan, plan).take(np.zeros(0, int))) == ()
+    assert diagnose(Scanner.of(plan), edges(plan, plan)) == Diagnosis()
+    none = edges(plan, plan).take(np.zeros(0, int))
+    assert diagnose(Scanner.of(plan), none) == Diagnosis()
 
 
 @pytest.mark.parametrize(
@@ -227,7 +205,7 @@ def test_a_baseline_that_becomes_too_wide_is_named(diverging):
 
     def sentences(metres: float) -> list[str]:
         truth = changed(diverging, lambda document: apart(document, metres))
-        causes = diagnose(scanner, edges(diverging, truth))
+        causes = diagnose(scanner, edges(diverging, truth)).causes
         return [in_words(cause, scanner) for cause in causes]
 
     (sentence,) = sentences(2e-3)

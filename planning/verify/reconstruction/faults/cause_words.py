@@ -10,7 +10,8 @@ from planning.verify.reconstruction.calibration import (
 )
 from planning.verify.reconstruction.scanner import Scanner
 
-from .diagnosis import Cause, Explanation
+from .diagnosis import Cause
+from .explanations import Explanation
 from .supposed import GRAZING
 
 _MM = 1e3
@@ -22,7 +23,7 @@ _MOST_ASIDE = 0.5
 
 def in_words(cause: Cause, plan: Scanner) -> str:
     """Return what a cause looks like, and how far the edges were off their rings."""
-    before, remaining = cause[0].before.misfit(), cause[0].remaining_m
+    before, remaining = cause[0].left_m
     return (
         f"{' or '.join(_looks(one, plan) for one in cause)} (that takes the edges' "
         f"mean distance from their rings from {_MM * before:.3f} to "
@@ -31,37 +32,33 @@ def in_words(cause: Cause, plan: Scanner) -> str:
 
 
 def _looks(explanation: Explanation, plan: Scanner) -> str:
-    correction = explanation.correction
-    states = explanation.before.supposed, explanation.after.supposed
-    if correction.role == "objects":
+    change = explanation.change
+    states = explanation.before, explanation.after
+    if change.role == "objects":
         return _object_looks(explanation)
-    devices = plan.cameras if correction.role == "cameras" else plan.projectors
-    names = [devices[index].id for index in correction.devices]
-    if "swap" in correction.moves:
+    devices = plan.cameras if change.role == "cameras" else plan.projectors
+    names = [devices[index].id for index in change.devices]
+    if "swap" in change.moves:
         return f"{' and '.join(names)} look swapped"
-    before, after = (getattr(s, correction.role)[correction.devices[0]] for s in states)
-    if "zoom" in correction.moves:
-        change = float(after.matrix[0, 0] / before.matrix[0, 0]) - 1.0
-        longer = "longer" if change > 0.0 else "shorter"
-        return (
-            f"{names[0]} looks as if its focal length were {_per_cent(change)} {longer}"
-        )
+    before, after = (getattr(s, change.role)[change.devices[0]] for s in states)
+    if "zoom" in change.moves:
+        by = float(after.matrix[0, 0] / before.matrix[0, 0]) - 1.0
+        longer = "longer" if by > 0.0 else "shorter"
+        return f"{names[0]} looks as if its focal length were {_per_cent(by)} {longer}"
     away = float(np.linalg.norm(states[0].objects[0].centre - before.centre))
     looks = f"{names[0]} looks as if it {_displaced(before, after, away)}"
-    if correction.role == "cameras":
+    if change.role == "cameras":
         return looks + _too_wide(names[0], after, plan)
     return looks + _grazing(before, after, plan)
 
 
 def _object_looks(explanation: Explanation) -> str:
-    before, after = (
-        state.supposed.objects[0] for state in (explanation.before, explanation.after)
-    )
+    before, after = (rig.objects[0] for rig in (explanation.before, explanation.after))
     words: list[str] = []
-    if "zoom" in explanation.correction.moves:
+    if "zoom" in explanation.change.moves:
         change = after.scale / before.scale - 1.0
         words.append(f"{_per_cent(change)} {'larger' if change > 0 else 'smaller'}")
-    if "shift" in explanation.correction.moves:
+    if "shift" in explanation.change.moves:
         shift = float(np.linalg.norm(after.centre - before.centre))
         words.append(f"moved by {_millimetres(shift)}")
         turn = _angle(before.world_from_device, after.world_from_device)

@@ -29,8 +29,10 @@ def explained(failures: tuple[str, ...], measured: MeasuredClouds) -> tuple[str,
     causes = [*blurred, *_dark(measured)]
     if not blurred:
         diagnosed = diagnose(plan, Evidence.of(plan, decoded))
-        causes += [in_words(cause, plan) for cause in diagnosed]
-        causes += wrong_roots(plan, decoded) if not diagnosed else []
+        causes += [in_words(cause, plan) for cause in diagnosed.causes]
+        causes += wrong_roots(plan, decoded) if not diagnosed.causes else []
+        if diagnosed.remark and not causes:
+            causes = [diagnosed.remark]
     incomplete = where_missing(measured, displaced=bool(causes)) + causes
     inaccurate = causes or [where_inaccurate(plan, measured.cloud)]
     # So `judge` words that something is missing.

@@ -25,7 +25,7 @@ Role = Literal["cameras", "projectors", "objects"]
 # Points in the world [m] and unit normals there, shape (n, 3), NaN where rays miss.
 Places = tuple[Array, Array]
 # Edges of each pair of devices that are looked at.
-_EDGES_A_PAIR = 240
+EDGES_A_PAIR = 240
 # Incidence of light beyond which edges smear: formulation.md section 2 [rad].
 GRAZING = np.deg2rad(70.0)
 # Pairs with fewer edges say nothing.
@@ -117,14 +117,14 @@ class Evidence(Columns):
         return cls(pixels, np.zeros(n), np.full(n, c), np.full(n, p), np.zeros(n))
 
     @classmethod
-    def of(cls, plan: Scanner, decoded: Pairs) -> Self:
-        """Take as many edges of each pair, evenly; none with disordered labels."""
+    def of(cls, plan: Scanner, decoded: Pairs, most: int = EDGES_A_PAIR) -> Self:
+        """Take so many edges of each pair, evenly; none with disordered labels."""
         parts = [cls.at(np.zeros((0, 2)), 0, 0)]
         for (p, c), pair in decoded:
             edges = pair.edges
             if len(edges) < _LEAST_EDGES or pair.rejected.get("labels", 0):
                 continue
-            some = np.linspace(0, len(edges) - 1, min(_EDGES_A_PAIR, len(edges)))
+            some = np.linspace(0, len(edges) - 1, min(most, len(edges)))
             some = some.astype(np.int64)
             radii = plan.projectors[p].pattern.radii[edges.rings[some]]
             at = cls.at(edges.pixels[some], p, c)
@@ -152,17 +152,25 @@ def mismatches(evidence: Evidence, supposed: Supposed, at: Places) -> Array:
     coordinate of the projector's pixel that lights X (as the patterns were drawn), the
     mismatch is ``(rho - R) z / sqrt(1 + R^2)``, in parallel light ``rho - R``.
     """
-    mismatch = np.full(len(evidence), np.nan)
+    mismatch, depth = offsets(evidence, supposed, at)
+    for p in np.unique(evidence.projector):
+        lit_by = evidence.projector == p
+        mismatch[lit_by] = supposed.plan.projectors[p].light.across_m(
+            mismatch[lit_by], evidence.radii[lit_by], depth[lit_by]
+        )
+    return mismatch
+
+
+def offsets(evidence: Evidence, supposed: Supposed, at: Places) -> tuple[Array, Array]:
+    """Return rho - R of edges, NaN as for `mismatches`, and depths z [m], (n,) each."""
+    offset, depth = np.full((2, len(evidence)), np.nan)
     for p in np.unique(evidence.projector):
         lit_by = evidence.projector == p
         projector, design = supposed.projectors[p], supposed.plan.projectors[p]
         points, normals = (one[lit_by] for one in at)
-        radii = evidence.radii[lit_by]
         with np.errstate(invalid="ignore", divide="ignore"):
-            pixels, depth = projector.panel(points)
-            plane = design.ring_plane(pixels)
-            off = np.hypot(plane[:, 0], plane[:, 1]) - radii
+            pixels, depth[lit_by] = projector.panel(points)
+            rho = np.hypot(*design.ring_plane(pixels).T)
             lit = projector.incidence_cosine(points, normals) > 0.0
-            off = np.where(lit, design.light.across_m(off, radii, depth), np.nan)
-        mismatch[lit_by] = off
-    return mismatch
+            offset[lit_by] = np.where(lit, rho - evidence.radii[lit_by], np.nan)
+    return offset, depth

@@ -1,0 +1,207 @@
+"""Every pose and optics at once, the object's too: edges off their rings, and slopes.
+
+Of a camera with optical centre c, its ray r meets the mesh, whose normal there is N, in
+X. If the ray moves by d at X, X moves by d - r (N.d) / (N.r) on the plane of the face;
+if the surface moves by v, by r (N.v) / (N.r). With g the gradient of the ring
+coordinate that a projector draws, an edge is therefore off its ring by another ::
+
+    h.d,  h = g - N (g.r) / (N.r)        camera        ((g.r) / (N.r)) N.v      object
+
+and by -g.v if the projector moves. Where facets meet, slopes jump with N.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+from scipy.linalg import block_diag
+from scipy.spatial.transform import Rotation
+
+from planning.verify.reconstruction.arrays import Array, Indices
+from planning.verify.reconstruction.calibration import (
+    CameraCalibration,
+    ProjectorCalibration,
+)
+from planning.verify.reconstruction.cloud import TEXTURE_PX
+
+from .supposed import Evidence, Places, Role, Supposed, offsets, places
+
+# Of each body in its own axes: turn [rad], displacement [m]; then of a device the focal
+# length's change as a share and the principal point's [px], of the object its size's.
+TURN, SHIFT, ZOOM, CENTRE = slice(0, 3), slice(3, 6), slice(6, 7), slice(7, 9)
+_OF_DEVICE, _OF_OBJECT = 9, 7
+# An edge that runs along its viewing ray isn't surer than this share of the median.
+_LEAST_SLOPE = 0.2
+_Device = TypeVar("_Device", CameraCalibration, ProjectorCalibration)
+
+
+@dataclass(frozen=True, eq=False)
+class Bundle:
+    """Edges, and all that may be changed of how things are supposed to stand."""
+
+    evidence: Evidence
+    supposed: Supposed
+
+    @property
+    def n_unknowns(self) -> int:
+        """Nine of each camera, then of each projector, then seven of the object."""
+        rig = self.supposed
+        return _OF_DEVICE * len(rig.cameras + rig.projectors) + _OF_OBJECT
+
+    def columns(self, role: Role, index: int, part: slice = slice(None)) -> Indices:
+        """Return the places of a body's unknowns."""
+        cameras, projectors = self.supposed.cameras, self.supposed.projectors
+        before = {"cameras": 0, "projectors": len(cameras)}
+        first = index + before.get(role, len(cameras + projectors))
+        size = _OF_OBJECT if role == "objects" else _OF_DEVICE
+        begin = _OF_DEVICE * first
+        return np.arange(begin, begin + size)[part]
+
+    def moved(self, x: Array) -> Supposed:
+        """Return how everything stands after changes, shape (n_unknowns,)."""
+        rig = self.supposed
+        cameras = tuple(
+            _moved_device(one, x[self.columns("cameras", k)])
+            for k, one in enumerate(rig.cameras)
+        )
+        projectors = tuple(
+            _moved_device(one, x[self.columns("projectors", k)])
+            for k, one in enumerate(rig.projectors)
+        )
+        change, (body,) = x[self.columns("objects", 0)], rig.objects
+        scale = body.scale * (1.0 + float(change[ZOOM][0]))
+        pose = _moved_pose(body.world_from_device, change)
+        body = replace(body, world_from_device=pose, scale=scale)
+        return replace(rig, cameras=cameras, projectors=projectors, objects=(body,))
+
+    @cached_property
+    def sigma(self) -> Array:
+        """Standard deviation of rho - R by the edges' own noise, (n,).
+
+        As things are supposed to stand; where an edge misses the object, the median.
+        """
+        per_px = self._slopes(self.supposed)[1]
+        typical = np.nanmedian(per_px) if np.isfinite(per_px).any() else 1.0
+        per_px = np.where(np.isfinite(per_px), per_px, typical)
+        return np.fmax(per_px, _LEAST_SLOPE * typical) * np.hypot(
+            self.evidence.noise_px, TEXTURE_PX
+        )
+
+    def offsets(self, x: Array) -> Array:
+        """Return rho - R in units of sigma after changes, NaN as `offsets`, (n,)."""
+        rig = self.moved(x)
+        return offsets(self.evidence, rig, places(self.evidence, rig))[0] / self.sigma
+
+    def slopes(self, x: Array) -> Array:
+        """Return their derivatives by the changes, (n, n_unknowns)."""
+        slopes = self._slopes(self.moved(x))[0] / self.sigma[:, None]
+        return slopes @ self._inner(x)
+
+    def _inner(self, x: Array) -> Array:
+        """Derivative of changes from where things stand after x, by x: block diagonal.
+
+        A turn w changes by J dw, with ``J = I - (1 - cos t) / t^2 [w] + (t - sin t) /
+        t^3 [w]^2``, t = |w|; a displacement shows in the turned axes.
+        """
+        blocks: list[Array] = []
+        rig = self.supposed
+        for size in (*[_OF_DEVICE] * len(rig.cameras + rig.projectors), _OF_OBJECT):
+            change = x[sum(map(len, blocks)) :][:size]
+            turn = change[TURN]
+            t = float(np.linalg.norm(turn))
+            cross = np.cross(np.eye(3), turn)
+            block = np.eye(size)
+            if t > 0.0:
+                block[TURN, TURN] += (t - np.sin(t)) / t**3 * cross @ cross
+                block[TURN, TURN] -= (1.0 - np.cos(t)) / t**2 * cross
+            block[SHIFT, SHIFT] = Rotation.from_rotvec(turn).as_matrix().T
+            block[ZOOM, ZOOM] /= 1.0 + change[ZOOM]
+            blocks.append(block)
+        return np.asarray(block_diag(*blocks), np.float64)
+
+    def _slopes(self, rig: Supposed) -> tuple[Array, Array]:
+        """Derivatives of rho - R by changes of a rig, and by the pixel, its length."""
+        evidence, at = self.evidence, places(self.evidence, rig)
+        slopes = np.zeros((len(evidence), self.n_unknowns))
+        per_px = np.zeros(len(evidence))
+        pairs = np.column_stack([evidence.projector, evidence.camera])
+        for p, c in np.unique(pairs, axis=0).tolist():
+            rows = np.flatnonzero((pairs == (p, c)).all(axis=1))
+            there = at[0][rows], at[1][rows]
+            with np.errstate(invalid="ignore", divide="ignore"):
+                gradient, of_projector = _projector_slopes(rig, p, there[0])
+                of_camera, of_object, per_px[rows] = _camera_slopes(
+                    rig, c, evidence.pixels[rows], there, gradient
+                )
+            slopes[np.ix_(rows, self.columns("projectors", p))] = of_projector
+            slopes[np.ix_(rows, self.columns("cameras", c))] = of_camera
+            slopes[np.ix_(rows, self.columns("objects", 0))] = of_object
+        return slopes, per_px
+
+
+def _projector_slopes(rig: Supposed, p: int, points: Array) -> tuple[Array, Array]:
+    """Gradient of the ring coordinate by the point (n, 3), and by the projector."""
+    projector, design = rig.projectors[p], rig.plan.projectors[p]
+    law, pose = projector.light, projector.world_from_device
+    local = (points - pose[:3, 3]) @ pose[:3, :3]
+    pixels, _ = projector.panel(points)
+    turn = design.ring_from_device
+    q = design.panel_coordinates(pixels)
+    plane = law.turned(q, turn)
+    across = plane / np.linalg.norm(plane, axis=1, keepdims=True)
+    by_pixel = law.turned_slopes(q, across, turn) / np.diag(design.matrix)[:2]
+    focal, centre = np.diag(projector.matrix)[:2], projector.matrix[:2, 2]
+    by_place = law.plane_slopes(local, by_pixel * focal)
+    zoom = _dot(by_pixel, pixels - centre)
+    columns = [-np.cross(local, by_place), -by_place, zoom, by_pixel]
+    return by_place @ pose[:3, :3].T, np.column_stack(columns)
+
+
+def _camera_slopes(
+    rig: Supposed, c: int, pixels: Array, at: Places, gradient: Array
+) -> tuple[Array, Array, Array]:
+    """Derivatives by the camera and the object, and by a pixel across its ring."""
+    camera, (body,), (points, normals) = rig.cameras[c], rig.objects, at
+    rays = points - camera.centre
+    reach = np.linalg.norm(rays, axis=1, keepdims=True)
+    rays /= reach
+    lever = _dot(gradient, rays) / _dot(normals, rays) * normals
+    turn = camera.world_from_device[:3, :3]
+    local, across = (points - camera.centre) @ turn, (gradient - lever) @ turn
+    step = 0.5 * np.eye(2)
+    by_pixel = np.hstack(
+        [
+            _dot(
+                reach * (camera.rays(pixels + one) - camera.rays(pixels - one)),
+                gradient - lever,
+            )
+            for one in step
+        ]
+    )
+    zoom = -_dot(by_pixel, pixels - camera.matrix[:2, 2])
+    of_camera = [np.cross(local, across), across, zoom, -by_pixel]
+    turn = body.world_from_device[:3, :3]
+    local, along = (points - body.centre) @ turn, lever @ turn
+    of_object = [np.cross(local, along), along, _dot(along, local)]
+    per_px = np.linalg.norm(by_pixel, axis=1)
+    return np.column_stack(of_camera), np.column_stack(of_object), per_px
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return np.einsum("ij,ij->i", a, b)[:, None]
+
+
+def _moved_pose(pose: Array, change: Array) -> Array:
+    turn = np.eye(4)
+    turn[:3, :3] = Rotation.from_rotvec(change[TURN]).as_matrix()
+    turn[:3, 3] = change[SHIFT]
+    return pose @ turn
+
+
+def _moved_device(device: _Device, change: Array) -> _Device:
+    matrix = device.matrix.copy()
+    matrix[[0, 1], [0, 1]] *= 1.0 + float(change[ZOOM][0])
+    matrix[:2, 2] += change[CENTRE]
+    pose = _moved_pose(device.world_from_device, change)
+    return replace(device, world_from_device=pose, matrix=matrix)
