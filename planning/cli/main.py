@@ -12,6 +12,7 @@ import click
 
 from planning.cli.declared.evaluate_declared import evaluate
 from planning.cli.declared.other_declared import (
+    accept,
     lens,
     rigs,
     sample,
@@ -84,6 +85,7 @@ def commands() -> None:
     plan --mesh face.obj --max-projectors 3   plans, checks, writes ./face-plan/
     plan evaluate face.obj --poses rig.csv    what a rig measures as it stands
     plan verify face-plan/plan.json           recomputes every claim, checks again
+    plan accept face-plan/plan.json           a maker's figures: ball bars, plates
     plan show face-plan/plan.json             every place in mesh axes, camera by camera
     plan tolerance face-plan --mount 2mm,0.2deg
                                               how well devices must be mounted
@@ -96,7 +98,7 @@ def commands() -> None:
 
 
 for _command in (
-    *(rig_command, evaluate, verify, show, reconstruct, tolerance),
+    *(rig_command, evaluate, verify, accept, show, reconstruct, tolerance),
     *(lens, rigs, schema, sample),
 ):
     commands.add_command(_command)

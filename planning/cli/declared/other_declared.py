@@ -1,4 +1,4 @@
-"""`plan verify`, `show`, `rigs`, `schema` and `sample`: their options."""
+"""`plan verify`, `accept`, `show`, `rigs`, `schema` and `sample`: their options."""
 
 from pathlib import Path
 from typing import Any
@@ -43,6 +43,31 @@ def verify(**options: Any) -> None:  # noqa: ANN401
     from planning.cli.verify_command import verify_command
 
     run(lambda: verify_command(options), debug=options["debug"])
+
+
+@click.command()
+@click.argument("plan_file", type=PlanFile(), metavar="DIR[/plan.json]")
+@click.option(
+    "--draws",
+    type=click.IntRange(0, 100_000),
+    default=200,
+    metavar="N",
+    help="Rigs drawn from what the plan's calibration leaves.",
+)
+@click.option(
+    "--seed", type=click.IntRange(0), help="Of noise and rigs [default: the plan's]."
+)
+@threads_option
+@output_options
+def accept(**options: Any) -> None:  # noqa: ANN401
+    """Measure spheres, ball bars and plates in the plan's volume, as a maker would.
+
+    Simulated after VDI/VDE 2634 part 2: probing error (form and size), sphere spacing
+    error and flatness, calibrated perfectly and with what the calibration leaves.
+    """
+    from planning.cli.accept_command import accept_command
+
+    run(lambda: accept_command(options), debug=options["debug"])
 
 
 @click.command()

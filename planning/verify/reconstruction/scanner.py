@@ -71,12 +71,14 @@ class ScanLimits:
         min_conditioning: Least |r.m| of a point.
         max_lit: Largest incidence of light that counts [rad].
         max_seen: Largest incidence at a camera that counts [rad].
+        max_sigma_m: Largest standard deviation of a point that counts [m].
     """
 
     check: CheckLimits
     min_conditioning: float
     max_lit: float
     max_seen: float
+    max_sigma_m: float = np.inf
 
     @property
     def decoder(self) -> dict[str, float]:
@@ -147,6 +149,7 @@ class Scanner:
                 wanted.triangulation.min_conditioning,
                 wanted.projector.max_incidence,
                 wanted.camera.max_incidence,
+                wanted.triangulation.max_sigma_m or np.inf,
             ),
             defocus_of(plan, "projector"),
             defocus_of(plan, "camera"),

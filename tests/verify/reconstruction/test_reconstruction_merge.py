@@ -8,6 +8,12 @@ from scipy.spatial import KDTree
 from support import reconstruction_rigs as rigs
 
 from geometry.mesh.mesh import TriangleMesh
+from planning.model.calibration_errors import CalibrationErrors
+from planning.verify.reconstruction.check.calibration_sigma import (
+    _SHARE,
+    _off,
+    camera_px,
+)
 from planning.verify.reconstruction.check.merge import Merged, merge
 from planning.verify.reconstruction.check.overlaps import compare_overlaps
 from planning.verify.reconstruction.cloud import Cloud
@@ -209,6 +215,45 @@ def test_what_one_camera_measures_much_worse_gives_way_to_another(flat):
         gone = [np.mean(~found.stays[cloud.camera == c]) for c in (0, 1)]
         assert gone[0] < 0.05
         assert least <= gone[1] < most
+
+
+def test_what_a_calibration_leaves_decides_between_cameras(flat):
+    """Over the plan's limit one gives way; where no limit is stated both stay."""
+    alone = [(key, pair) for key, pair in flat if key[0] == 0]
+    cloud = joined(alone)
+    lit = {key: pair.lit for key, pair in alone}
+    plan = scanner_of(FLAT)
+    plan = replace(plan, calibration=CalibrationErrors(np.radians(0.02), 5e-5))
+
+    def merged_at(most):
+        limits = replace(plan.limits, max_sigma_m=most)
+        return merge(cloud, replace(plan, limits=limits), lit, pitch_px=PITCH_PX)
+
+    every = merged_at(np.inf)
+    total = np.hypot(every.sigma, every.calibration)
+    medians = [np.median(total[every.cloud.camera == c]) for c in (0, 1)]
+    worse = int(np.argmax(medians))
+    assert medians[worse] > 1.2 * medians[1 - worse]
+    found = merged_at(float(np.mean(medians)))
+    for camera, least, most in ((worse, 0.8, 1.0), (1 - worse, 0.0, 0.05)):
+        lost = np.mean(~found.stays[every.stays & (cloud.camera == camera)])
+        assert least <= lost <= most
+
+
+def test_an_edge_is_as_unsure_as_its_camera(flat):
+    """Against the pixels of cameras that are off by one thing each, on their axes."""
+    plan = scanner_of(FLAT)
+    errors = CalibrationErrors(np.radians(0.02), 5e-5, 2e-4, 0.3)
+    plan = replace(plan, calibration=errors)
+    (cloud, *_) = [pair.cloud.take(np.arange(40)) for _, pair in flat]
+    camera = plan.cameras[int(cloud.camera[0])]
+    known = camera.project(cloud.points)
+    square = np.zeros(len(cloud))
+    for off in _off(camera, errors):
+        # Of both directions in the image the mean, and errors a share of theirs.
+        square += np.square(off.project(cloud.points) - known).sum(axis=1) / 2.0
+    cloud = replace(cloud, pixels=known)
+    assert camera_px(cloud, plan) == pytest.approx(np.sqrt(square) / _SHARE, rel=0.02)
 
 
 def noisier(cloud: Cloud, more_px: float = 0.1) -> Cloud:

@@ -47,6 +47,27 @@ def calibration_sigma(cloud: Cloud, normals: Array, scanner: Scanner) -> Array:
     return sigma
 
 
+def camera_px(cloud: Cloud, scanner: Scanner) -> Array:
+    """Return how far what the calibration leaves of a camera moves an edge [px], (n,).
+
+    Along any line of the image; f in [px], t the distance, u - u_0 from the centre::
+
+        s_e^2 = (f s_a)^2 + (f s_x / t)^2 + s_f^2 |u - u_0|^2 / 2 + s_u^2
+    """
+    errors, moved = scanner.calibration, np.zeros(len(cloud))
+    if errors is None:
+        return moved
+    for c, camera in enumerate(scanner.cameras):
+        rows = np.flatnonzero(cloud.camera == c)
+        reach = np.linalg.norm(cloud.points[rows] - camera.centre, axis=1)
+        aside = cloud.pixels[rows] - camera.matrix[:2, 2]
+        turned = np.hypot(errors.about_axis, errors.along_axis_m / reach)
+        longer = errors.focal**2 * np.square(aside).sum(axis=1) / 2.0
+        square = (camera.focal_px * turned) ** 2 + longer + errors.along_line_px**2
+        moved[rows] = np.sqrt(square)
+    return moved
+
+
 def _of_pair(
     cloud: Cloud, normals: Array, pair: PairCalibration, errors: CalibrationErrors
 ) -> Array:

@@ -17,7 +17,7 @@ from planning.verify.reconstruction.decode.decode import PairIndex
 from planning.verify.reconstruction.decode.lit_image import LitImage
 from planning.verify.reconstruction.scanner import Scanner
 
-from .calibration_sigma import calibration_sigma
+from .calibration_sigma import calibration_sigma, camera_px
 from .overlaps import compare_overlaps, pixel_sizes
 from .ring_curves import RingCurves
 from .tiles import Tiles, plane_normals
@@ -78,7 +78,9 @@ def merge(
         pitch_px: About how far rings are apart in images.
     """
     shared, crossed, differs = compare_overlaps(cloud, plan, lit)
-    curves = RingCurves.of(cloud, plan)
+    # Cameras disagree by what the calibration leaves, and count for as much less.
+    unsure_px = np.hypot(cloud.noise_px, camera_px(cloud, plan))
+    curves = RingCurves.of(replace(cloud, noise_px=unsure_px), plan)
     sharpness = _sharpness(cloud)
     confirmed, contradicted = curves.evidence(sharpness)
     steps = ~confirmed & ((sharpness < _SHARP) | differs)
@@ -104,6 +106,8 @@ def merge(
     # In a step there is no surface whose normal would make an error less.
     largest = np.linalg.norm(fitted.shift, axis=1) * fitted.noise_px
     sigma = np.where(doubtful, largest, fitted.sigma(normals))
+    calibration = calibration_sigma(fitted, normals, plan)
+    total = np.hypot(sigma, calibration)
 
     stays = ~(steps | redundant)
     size = pixel_sizes(cloud, plan)
@@ -120,10 +124,17 @@ def merge(
         if len(some):
             side_m = side_px * float(np.median(size[some]))
             cell = _cells(fitted.points[some], kind[some], side_m)
-            stays[some] = _sure(cell, source[some], sigma[some], ratio)
-    left_over, normals = fitted.take(stays), normals[stays]
-    calibration = calibration_sigma(left_over, normals, plan)
-    return Merged(left_over, stays, steps, shared, normals, sigma[stays], calibration)
+            most = plan.limits.max_sigma_m
+            stays[some] = _sure(cell, source[some], total[some], ratio, most)
+    return Merged(
+        fitted.take(stays),
+        stays,
+        steps,
+        shared,
+        normals[stays],
+        sigma[stays],
+        calibration[stays],
+    )
 
 
 def _sharpness(cloud: Cloud) -> Array:
@@ -145,8 +156,13 @@ def _cells(points: Array, kind: Indices, side_m: float) -> Array:
     return cube * (kind.max() + 1.0) + kind
 
 
-def _sure(cell: Array, source: Indices, sigma: Array, ratio: float) -> Mask:
-    """Which points are of the best one's source in their cell, or about as sure."""
+def _sure(
+    cell: Array, source: Indices, sigma: Array, ratio: float, most: float
+) -> Mask:
+    """Which points are of the best one's source in their cell, or about as sure.
+
+    None of another source is over `most` [m] where the best keeps to it.
+    """
     # Without a normal a point gives way to any other.
     known = np.where(np.isfinite(sigma), sigma, np.inf)
     _, place = np.unique(cell, return_inverse=True)
@@ -156,4 +172,5 @@ def _sure(cell: Array, source: Indices, sigma: Array, ratio: float) -> Mask:
     best_source = np.empty(len(least), dtype=source.dtype)
     best_source[place[best]] = source[best]
     good = source == best_source[place]
-    return good | ((ratio > 1.0) & (known <= ratio * least[place]))
+    others = np.minimum(ratio * least, np.maximum(most, least))
+    return good | ((ratio > 1.0) & (known <= others[place]))
