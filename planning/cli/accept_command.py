@@ -10,8 +10,8 @@ from typing import Any
 import click
 
 from geometry.parallel import n_threads
-from planning.acceptance.acceptance import Acceptance, Quantity, accept
-from planning.acceptance.artefacts import BAR, N_PLATES, PLATE, SPHERE
+from planning.experiments.acceptance.acceptance import Acceptance, Quantity, accept
+from planning.experiments.acceptance.artefacts import BAR, N_PLATES, PLATE, SPHERE
 from planning.model.calibration_errors import CalibrationErrors
 from planning.model.plan import RigPlan
 from planning.verify.reconstruction.scanner import Scanner

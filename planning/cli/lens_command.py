@@ -11,7 +11,7 @@ from planning.rig.lens_fit import LensFit
 from planning.rig.rig import load_rig
 
 from .console import print_json
-from .object_lines import size_lines
+from .lines.object_lines import size_lines
 
 
 def lens_command(options: Mapping[str, Any]) -> int:

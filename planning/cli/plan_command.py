@@ -20,7 +20,7 @@ from planning.scene.interest import Interest, read_selection, read_weight
 from planning.scene.ranges.ranged_body import RangedBody, read_ranges
 
 from .console import print_json, reporter, writable
-from .object_lines import optics_lines, size_lines
+from .lines.object_lines import optics_lines, size_lines
 from .saved_plans import SavedPlans
 
 # Options that `plan_rig` takes as they are.

@@ -49,7 +49,7 @@ from planning.verify.reconstruction.single_shot.single_shot import (
 from planning.verify.verification import bare
 
 from .console import print_json, reporter, writable
-from .deviation_table import deviation_lines
+from .lines.deviation_table import deviation_lines
 
 CLOUD, DEVIATION = "cloud.ply", "deviation.ply"
 # How near the object is taken to lie to the mesh that labels single images.

@@ -12,8 +12,8 @@ from support.plain_shapes import box, joined
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import sphere
+from planning.cli.lines.object_lines import optics_lines, size_lines
 from planning.cli.main import main
-from planning.cli.object_lines import optics_lines, size_lines
 from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.pipeline import plan_rig
 from planning.rig import optics

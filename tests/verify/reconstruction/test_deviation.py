@@ -11,7 +11,7 @@ from geometry.mesh.sampling import sample_surface
 from geometry.poses import transform
 from geometry.rays.proximity import closest_points
 from geometry.shapes.primitives import sphere
-from planning.cli.deviation_table import deviation_lines
+from planning.cli.lines.deviation_table import deviation_lines
 from planning.verify.reconstruction.check.cloud_file import CloudFile, LengthUnit
 from planning.verify.reconstruction.check.deviation import (
     best_fit,

@@ -10,9 +10,9 @@ from support.reconstruction_rigs import bumpy_sphere, small_rig
 from support.simulated_rigs import ONE_EACH, off_by, scales, triangulated
 
 from geometry.poses import look_at
-from planning.acceptance.acceptance import Measured, accept
-from planning.acceptance.artefacts import bars, plates
-from planning.acceptance.drawn_rigs import displaced, drawn
+from planning.experiments.acceptance.acceptance import Measured, accept
+from planning.experiments.acceptance.artefacts import bars, plates
+from planning.experiments.acceptance.rigs_off import displaced, drawn
 from planning.model.calibration_errors import CalibrationErrors
 from planning.model.planned import PlannedCamera
 from planning.verify.reconstruction.calibration import (
@@ -170,8 +170,12 @@ def test_a_longer_lens_makes_a_bar_longer_by_what_it_says(scanner):
 
 def test_what_a_maker_states_of_a_small_rig(scanner, monkeypatch):
     """One bar and one plate of all places: noise in form, calibration in lengths."""
-    monkeypatch.setattr("planning.acceptance.acceptance.bars", first_of(bars))
-    monkeypatch.setattr("planning.acceptance.acceptance.plates", first_of(plates))
+    monkeypatch.setattr(
+        "planning.experiments.acceptance.acceptance.bars", first_of(bars)
+    )
+    monkeypatch.setattr(
+        "planning.experiments.acceptance.acceptance.plates", first_of(plates)
+    )
     found = accept(scanner, seed=0, draws=20, threads=1)
     assert not found.unmeasured
     assert {name: len(v) for name, v in found.perfect.items()} == {

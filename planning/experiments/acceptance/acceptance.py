@@ -8,7 +8,7 @@
 Three in a thousand points may be left out of a span, and those count alone whose stated
 deviation keeps to what the plan asks of a point. Each artefact is rendered, decoded
 and merged as the object is in the plan's check; what a calibration leaves then moves
-the points of a whole rig alike (`drawn_rigs`), so that one rendering serves them all.
+the points of a whole rig alike (`rigs_off`), so that one rendering serves them all.
 """
 
 from collections.abc import Callable
@@ -28,8 +28,8 @@ from planning.verify.reconstruction.render.rendered import Spent, decode_rendere
 from planning.verify.reconstruction.scanner import Scanner
 
 from .artefacts import Bar, Plate, bars, plates
-from .drawn_rigs import displaced, drawn
 from .fits import FEWEST, fit_sphere, flatness
+from .rigs_off import displaced, drawn
 
 Quantity = Literal["PF", "PS", "SD", "F"]
 QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)

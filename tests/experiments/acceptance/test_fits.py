@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from planning.acceptance.fits import fit_sphere, flatness, spread
+from planning.experiments.acceptance.fits import fit_sphere, flatness, spread
 
 
 def cap(n=4000, radius=0.0125, half_angle_deg=60.0):
