@@ -18,6 +18,7 @@ from planning.report.assemble import write_plan
 from planning.report.entries.cost_entry import cost_record
 from planning.report.partial_plan import PartialPlan, PlanRequest
 from planning.report.summary.shortfall import shortfalls
+from planning.report.tolerance.robust import robustly
 from planning.rig.lens_fit import check_fields
 from planning.rig.mounted import Mounted
 from planning.rig.rig import Rig
@@ -60,6 +61,7 @@ def plan_rig(
     accuracy_of: AccuracyOf = "total",
     up: str | None = None,
     ring_axis: RingAxis | None = None,
+    robust: float | None = None,
     seed: int = 0,
     threads: int = 2,
     check: bool = True,
@@ -100,6 +102,7 @@ def plan_rig(
         ring_axis: Rings `centred` on what each projector lights, with axes `free` to
             stand where errors are smallest, or `auto`: centred where that takes no
             more cameras and the check is passed; None: the rig's.
+        robust: Share of drawn rigs that meet the requirements; None: none is drawn.
         seed: The same seed gives the same plan.
         threads: Worker threads; no result depends on it.
         check: Whether the plan is audited and reconstructed from pixels.
@@ -138,6 +141,7 @@ def plan_rig(
         accuracy_of=accuracy_of,
         up=up,
         ring_axis=ring_axis,
+        robust=robust,
     )
     clock = Stopwatch(progress, time_limit=time_limit)
     # BLAS must not split sums differently with another number of threads.
@@ -152,7 +156,7 @@ def plan_rig(
             mounted=fixed,
             evaluates=evaluates,
         )
-        planned = _evaluated if evaluates else _planned
+        planned = _evaluated if evaluates else robustly(_planned)
         plan, partial = planned(request, clock, keep)
         if check and not plan.document.truncated:
             plan = _checked(plan, partial, clock, keep)

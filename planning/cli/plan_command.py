@@ -36,6 +36,7 @@ _ASKED = (
     "accuracy_of",
     "up",
     "ring_axis",
+    "robust",
     "seed",
     "prove",
     "cameras_by",

@@ -25,10 +25,11 @@ def tolerance_command(options: Mapping[str, Any]) -> int:
         raise InputError(
             f"{path}: a rig without projectors or cameras measures nothing"
         )
-    mount, focal = options["mount"] or {}, options["focal"] or {}
-    mounting = Mounting(
-        mount.get("position", 0.0), mount.get("angle", 0.0), focal.get("focal", 0.0)
-    )
+    mounting = None
+    if options["mount"] is not None or options["focal"] is not None:
+        moved = (options["mount"] or {}) | (options["focal"] or {})
+        names = ("position", "angle", "focal")
+        mounting = Mounting(*(moved.get(name, 0.0) for name in names))
     left = options["calibrated"]
     calibration = None
     if left is not None:

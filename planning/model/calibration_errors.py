@@ -64,3 +64,26 @@ class Mounting:
 
 
 AS_PLANNED = Mounting()
+
+
+@dataclass(frozen=True)
+class Robust:
+    """What enough rigs must meet that aren't built exactly as planned.
+
+    The requirements of such a plan are tighter, by as much as that takes.
+
+    Attributes:
+        quantile: Share of drawn rigs that must meet what was asked.
+        mounting: How far their devices stand beside their poses.
+        dominant_coverage: As it was asked, like those below.
+        coverage: Measured area / area reachable by cameras.
+        region_coverage: Floor of each large region.
+        max_sigma_m: Largest standard deviation [m]; None: no limit.
+    """
+
+    quantile: float
+    mounting: Mounting
+    dominant_coverage: float
+    coverage: float
+    region_coverage: float
+    max_sigma_m: float | None

@@ -10,7 +10,7 @@ from math import pi
 from typing import Any, Literal
 
 from .bodies import Body, Box, Mount, Triple
-from .calibration_errors import PERFECT, CalibrationErrors
+from .calibration_errors import PERFECT, CalibrationErrors, Robust
 
 # Of a workspace: zones and standoffs that aren't given have no key.
 _ZONES = ("box", "keep_out", "mounting")
@@ -280,6 +280,7 @@ class Requirements:
         region_coverage: Floor of each dominant region: lit area / area reachable by
             projectors, and measured area / area reachable by cameras; 0: no floor.
         region_share: Regions of at least this share of the target's area have it.
+        robust: What drawn rigs must meet, where the rest is tightened for it.
     """
 
     max_projectors: int
@@ -297,6 +298,7 @@ class Requirements:
     existing: tuple[Existing, ...] = ()
     region_coverage: float = 0.0
     region_share: float = 0.01
+    robust: Robust | None = None
 
     def existing_of(self, kind: str) -> tuple[Existing, ...]:
         """Return the existing devices that are a `projector` or a `camera`."""
@@ -307,7 +309,10 @@ class Requirements:
         # By way of JSON, which turns tuples to lists and keeps every float.
         document = json.loads(json.dumps(asdict(self)))
         devices = [(device, _OF_ITS_OWN) for device in document["existing"]]
-        tables = [(document["workspace"], _LEFT_OUT), (document, ("existing",))]
+        tables = [
+            (document["workspace"], _LEFT_OUT),
+            (document, ("existing", "robust")),
+        ]
         for table, names in devices + tables:
             for name in names:
                 if not table[name]:

@@ -29,7 +29,7 @@ from .obstacle_tables import obstacles_of
 from .rig_devices import device_document, parallel_device, pinhole_device
 from .rig_files import read_rig, rig_folder
 from .rig_requirements import build_requirements, build_workspace
-from .rig_tables import ParallelTable, PinholeTable, RigTable, RingsTable
+from .rig_tables import MountingTable, ParallelTable, PinholeTable, RigTable, RingsTable
 from .wishes import Wishes
 
 Light = Literal["diverging", "parallel"]
@@ -240,6 +240,8 @@ class Rig:
             for key in ("existing", "obstacle")
             if getattr(table, key)
         }
+        if table.mounting != MountingTable():
+            listed["mounting"] = table.mounting.model_dump()
         if table.placement.clearance_mm:
             listed["clearance_m"] = table.placement.clearance_mm * 1e-3
         return {

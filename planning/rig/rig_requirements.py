@@ -8,6 +8,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.calibration_errors import AS_PLANNED
 from planning.model.errors import InfeasibleLimitsError, InputError
 from planning.model.requirements import (
     CameraLimits,
@@ -53,6 +54,8 @@ def build_requirements(
         calibration=table.calibration.errors(),
         accuracy_of=wishes.accuracy_of,
     )
+    if wishes.robust is not None:
+        _check_drawn(table, wishes.robust)
     if wishes.accuracy_mm is not None:
         _check_positive("accuracy_mm", wishes.accuracy_mm)
         triangulation = replace(triangulation, max_sigma_m=wishes.accuracy_mm * 1e-3)
@@ -76,6 +79,21 @@ def build_requirements(
         region_coverage=_share("region_coverage", wishes, shares, or_none=True),
         region_share=shares.region_share,
     )
+
+
+def _check_drawn(table: RigTable, quantile: float) -> None:
+    """Refuse to draw rigs of which nothing is stated, or all but an impossible share.
+
+    Raises:
+        InputError: It says what to write.
+    """
+    if not 0.0 < quantile < 1.0:
+        raise InputError(f"robust = {quantile:g} must lie over 0 and below 1")
+    if table.calibration.errors() is None and table.mounting.bounds() == AS_PLANNED:
+        raise InputError(
+            f"robust = {quantile:g}: rig {table.name} states neither [calibration] nor "
+            f"[mounting], so that drawn rigs would all be as planned; write one of them"
+        )
 
 
 def build_workspace(

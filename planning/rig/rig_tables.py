@@ -10,7 +10,11 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from planning.model.bodies import BodyTable, MountTable
-from planning.model.calibration_errors import PERFECT, CalibrationErrors
+from planning.model.calibration_errors import (
+    PERFECT,
+    CalibrationErrors,
+    Mounting,
+)
 from planning.model.document.device_records import RingAxis
 from planning.model.table_types import (
     Acute,
@@ -226,6 +230,22 @@ class CalibrationTable(Table):
         return None if errors == PERFECT else errors
 
 
+class MountingTable(Table):
+    """How far devices may stand beside their planned poses, `[mounting]`."""
+
+    position_mm: Annotated[float, Field(ge=0.0)] = 0.0
+    angle_deg: Annotated[float, Field(ge=0.0, le=45.0)] = 0.0
+    focal_percent: Annotated[float, Field(ge=0.0, le=20.0)] = 0.0
+
+    def bounds(self) -> Mounting:
+        """Return them in metres, radians and shares."""
+        return Mounting(
+            1e-3 * self.position_mm,
+            math.radians(self.angle_deg),
+            1e-2 * self.focal_percent,
+        )
+
+
 class RequirementsTable(Table):
     """What share of the target a plan must reach, `[requirements]`."""
 
@@ -261,6 +281,7 @@ class RigTable(Table):
     workspace: WorkspaceTable = WorkspaceTable()
     limits: LimitsTable = LimitsTable()
     calibration: CalibrationTable = CalibrationTable()
+    mounting: MountingTable = MountingTable()
     requirements: RequirementsTable = RequirementsTable()
     check: CheckTable = CheckTable()
     existing: list[ExistingTable] = Field(default=[])

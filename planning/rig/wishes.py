@@ -15,7 +15,8 @@ class Wishes:
     """What is asked of a plan beside what its rig says; None: as the rig has it.
 
     As many cameras as needed where `max_cameras` is None. The target is then that of
-    dominant regions, and the whole surface of a body known by its ranges.
+    dominant regions, and the whole surface of a body known by its ranges. `robust` is
+    the share of drawn rigs that must meet what is asked; None: none is drawn.
     """
 
     max_projectors: int
@@ -30,3 +31,4 @@ class Wishes:
     accuracy_of: AccuracyOf = "total"
     up: str | None = None
     ring_axis: RingAxis | None = None
+    robust: float | None = None

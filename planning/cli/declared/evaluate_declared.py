@@ -17,6 +17,7 @@ _OF_PLANS = {
     "max_projectors": None,
     "max_cameras": None,
     "fixed": None,
+    "robust": None,
     "prove": False,
     "cameras_by": "both",
 }

@@ -139,6 +139,13 @@ from planning.cli.console import (
     "alone.",
 )
 @click.option(
+    "--robust",
+    type=Share(),
+    metavar="Q",
+    help="Tighten the requirements until this share of drawn rigs meets them, mounted "
+    "and calibrated as the rig's [mounting] and [calibration] say [default: none].",
+)
+@click.option(
     "--cameras-by",
     type=click.Choice(["cover", "paper", "both"]),
     default="both",

@@ -84,6 +84,28 @@ class Coverage(Part):
     camera_relaxations: tuple[Relaxation, ...] = ()
 
 
+class RobustRecord(Part):
+    """How many drawn rigs meet what was asked, and what that costs.
+
+    Attributes:
+        n_drawn: Rigs drawn.
+        n_met: Of them, those that meet it.
+        least: So many make it as good as sure that the quantile of all rigs does.
+        rounds: How often requirements were tightened.
+        n_projectors_without: Projectors of the plan for exact rigs; likewise below.
+        n_met_without: Of `n_drawn_without`, those of its rigs that meet it.
+    """
+
+    n_drawn: int
+    n_met: int
+    least: int
+    rounds: int
+    n_projectors_without: int
+    n_cameras_without: int
+    n_drawn_without: int
+    n_met_without: int
+
+
 class RegionCoverage(Part):
     """What is covered of a region, as `coverage` says it of the target; areas in [m²].
 

@@ -150,6 +150,7 @@ class RigRecord(Part):
     notes: tuple[str, ...] = ()
     existing: tuple[dict[str, Any], ...] = ()
     obstacle: tuple[dict[str, Any], ...] = ()
+    mounting: dict[str, float] = Field(default={})
     clearance_m: float = 0.0
 
 

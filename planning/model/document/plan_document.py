@@ -16,6 +16,7 @@ from .coverage_records import (
     Overlap,
     ProjectorMarginal,
     RegionRecord,
+    RobustRecord,
 )
 from .device_records import BaselineRow, CameraRecord, ProjectorRecord, RingAxes
 from .input_records import (
@@ -94,6 +95,7 @@ class PlanDocument(Part):
     baselines: tuple[BaselineRow, ...]
     ranges: RangesRecord | None = None
     evaluation: EvaluationRecord | None = None
+    robust: RobustRecord | None = None
     camera_groups: tuple[tuple[str, ...], ...] = ()
     cost: CostRecord
     members: tuple[MemberRecord, ...]

@@ -24,7 +24,21 @@ def shortfalls(plan: RigPlan) -> tuple[str, ...]:
         *_reachable(plan.document, required),
         *_covered(plan.document, required),
         *floor_shortfalls(plan),
+        *_robust(plan.document, required),
         *(() if check is None or check.passed else check.failures),
+    )
+
+
+def _robust(document: PlanDocument, requirements: Requirements) -> Iterator[str]:
+    """Whether enough rigs meet what is asked that aren't built exactly as planned."""
+    found, robust = document.robust, requirements.robust
+    if found is None or robust is None or found.n_met >= found.least:
+        return
+    yield (
+        f"{found.n_met} of {found.n_drawn} drawn rigs meet what is asked, at least "
+        f"{found.least} must so that {percent(robust.quantile)} of all do (--robust). "
+        f"What would help: a better [calibration] or [mounting], a larger --accuracy, "
+        f"more devices; `plan tolerance` says what matters most"
     )
 
 

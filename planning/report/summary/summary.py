@@ -16,6 +16,7 @@ from .coverage_lines import coverage_lines, marginal_lines
 from .device_lines import axis_name, device_lines, mount_lines
 from .proof_lines import proof_lines
 from .ring_lines import range_lines, ring_lines
+from .robust_lines import robust_lines
 from .warning_lines import warning_lines
 
 # An object under this share of the field is taken to be in another unit.
@@ -39,6 +40,7 @@ def summary(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
         *warning_lines(plan),
         *proof_lines(plan),
         *coverage_lines(plan),
+        *robust_lines(plan),
         *range_lines(plan.document),
         *ring_lines(plan),
         *(() if plan.document.evaluation else marginal_lines(plan)),

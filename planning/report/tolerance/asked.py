@@ -6,7 +6,7 @@ against the accuracy, which is a standard deviation too.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from planning.model.requirements import Requirements
 
@@ -52,6 +52,7 @@ class Asked:
     @classmethod
     def of(cls, required: Requirements) -> "Asked":
         """Return what is asked of a plan."""
+        required = as_asked(required)
         limits = required.triangulation
         return cls(
             required.dominant_coverage,
@@ -73,3 +74,17 @@ class Asked:
             return
         if figures.rms_m is None or not figures.rms_m <= self.rms_m * (1.0 + _SLACK):
             yield "rms_m"
+
+
+def as_asked(required: Requirements) -> Requirements:
+    """Return the requirements before they were tightened to be met robustly."""
+    robust = required.robust
+    if robust is None:
+        return required
+    return replace(
+        required,
+        dominant_coverage=robust.dominant_coverage,
+        coverage=robust.coverage,
+        region_coverage=robust.region_coverage,
+        triangulation=replace(required.triangulation, max_sigma_m=robust.max_sigma_m),
+    )

@@ -24,7 +24,7 @@ from planning.scene.placed_bodies import Obstruction
 from planning.scene.samples import Target, merged
 from planning.scene.scene import Scene
 
-from .asked import Figures
+from .asked import Figures, as_asked
 from .drawn_rigs import Deviates, Rig, bounds_of, deviations_of
 from .retriangulation import retriangulated
 
@@ -112,6 +112,10 @@ class BuiltCase:
             judged.by_cameras,
             calibration,
         )
+
+    def shared(self) -> "BuiltCase":
+        """Return the case for threads that each look at a rig of their own."""
+        return replace(self, scene=replace(self.scene, threads=1))
 
     @cached_property
     def planned(self) -> Outcome:
@@ -238,7 +242,7 @@ def scene_of(plan: RigPlan, *, threads: int) -> Scene:
         surface.mesh,
         surface.region,
         surface.steep,
-        plan.requirements,
+        as_asked(plan.requirements),
         plan.document.seed,
         threads,
         obstructions=Obstruction.about(surface.mesh, surface.obstacles, threads),

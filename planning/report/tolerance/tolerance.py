@@ -17,6 +17,7 @@ from planning.model.calibration_errors import (
 )
 from planning.model.plan import RigPlan
 from planning.model.progress import Report
+from planning.rig.rig_tables import MountingTable
 
 from .asked import Asked, Figures
 from .built_case import BuiltCase
@@ -115,11 +116,13 @@ class Tolerance:
 
 def question_of(
     plan: RigPlan,
-    mounting: Mounting,
+    mounting: Mounting | None,
     calibration: CalibrationErrors | None,
     seed: int | None,
 ) -> Question:
-    """Return what is drawn; None: as the plan states it, and its own seed."""
+    """Return what is drawn; None: as the plan's rig states it, and its own seed."""
+    if mounting is None:
+        mounting = MountingTable(**plan.document.rig.mounting).bounds()
     stated = plan.requirements.triangulation.calibration or PERFECT
     return Question(
         plan.digest,
@@ -151,8 +154,7 @@ def tolerance_of(
         report: Receives lines of progress.
     """
     report("coverage as planned, on the samples of the plan's claims")
-    case = BuiltCase.of(plan, question.calibration, threads=threads)
-    case = replace(case, scene=replace(case.scene, threads=1))
+    case = BuiltCase.of(plan, question.calibration, threads=threads).shared()
     asked = Asked.of(plan.requirements)
     study = Study() if file is None else file.study
     found = Tolerance(question, quantile, asked, as_planned(case), study.rigs[:n])

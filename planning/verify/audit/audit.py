@@ -26,6 +26,7 @@ from planning.verify.audit.coverage.area_claims import audit_areas, recomputed_a
 from planning.verify.audit.coverage.floor_claims import audit_floors
 from planning.verify.audit.coverage.inside_claims import audit_inside
 from planning.verify.audit.coverage.region_claims import audit_margins, audit_regions
+from planning.verify.audit.coverage.robust_claims import audit_robust
 from planning.verify.audit.coverage.sigma_claims import audit_sigma
 from planning.verify.audit.devices.body_claims import audit_bodies, audit_clearance
 from planning.verify.audit.devices.device_claims import audit_devices, audit_existing
@@ -54,6 +55,7 @@ _CLAIMS = (
     audit_areas,
     audit_inside,
     audit_sigma,
+    audit_robust,
     audit_margins,
     audit_regions,
     audit_floors,

@@ -1,0 +1,64 @@
+"""What a plan says of rigs that aren't built exactly as planned."""
+
+from planning.model.calibration_errors import PERFECT
+from planning.model.plan import RigPlan
+from planning.model.words import count_words, labelled, percent
+from planning.report.tolerance.tolerance_lines import (
+    calibration_words,
+    mounting_words,
+)
+
+
+def robust_lines(plan: RigPlan) -> list[str]:
+    """Return how many drawn rigs meet what is asked, and what it costs."""
+    found, robust = plan.document.robust, plan.requirements.robust
+    if found is None or robust is None:
+        return []
+    required, limits = plan.requirements, plan.requirements.triangulation
+    tighter = [
+        f"{name} {now:.4g} instead of {before:.4g}{unit}"
+        for name, now, before, unit in (
+            (
+                "lit",
+                100 * required.dominant_coverage,
+                100 * robust.dominant_coverage,
+                " %",
+            ),
+            ("measured", 100 * required.coverage, 100 * robust.coverage, " %"),
+            (
+                "regions",
+                100 * required.region_coverage,
+                100 * robust.region_coverage,
+                " %",
+            ),
+            (
+                "sigma",
+                1e3 * (limits.max_sigma_m or 0.0),
+                1e3 * (robust.max_sigma_m or 0.0),
+                " mm",
+            ),
+        )
+        if now != before
+    ]
+    more = [
+        f"{count_words(now - before, kind)} more"
+        for kind, now, before in (
+            ("projector", len(plan.projectors), found.n_projectors_without),
+            ("camera", len(plan.cameras), found.n_cameras_without),
+        )
+        if now != before
+    ]
+    lines = [
+        f"{found.n_met} of {found.n_drawn} drawn rigs meet what is asked, "
+        f"{percent(robust.quantile)} must ({found.least} of them make that as good as "
+        f"sure)",
+        f"mounted within {mounting_words(robust.mounting)}; calibration leaves "
+        f"{calibration_words(limits.calibration or PERFECT)}",
+    ]
+    if tighter:
+        lines += [
+            f"planned for {', '.join(tighter)}",
+            f"costs {' and '.join(more) or 'no device more'}; without it "
+            f"{found.n_met_without} of {found.n_drawn_without} rigs met it",
+        ]
+    return labelled("ROBUST", lines)
