@@ -132,6 +132,11 @@ def signed_limits(
     return 1e-3 * numbers[0], 1e-3 * numbers[1]
 
 
+def given(options: Mapping[str, Any], *names: str) -> dict[str, Any]:
+    """Return those of some options that have a value."""
+    return {name: options[name] for name in names if options[name] is not None}
+
+
 def reporter(*, quiet: bool) -> Report:
     """Return what writes a line of progress to stderr, or nothing."""
 

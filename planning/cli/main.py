@@ -11,6 +11,7 @@ from typing import NoReturn
 import click
 
 from planning.cli.declared.evaluate_declared import evaluate
+from planning.cli.declared.export_declared import export
 from planning.cli.declared.other_declared import (
     accept,
     lens,
@@ -28,7 +29,6 @@ from .console import stop, stop_signals
 
 _NOT_BUILT = {
     "report": "writes one self-contained HTML file",
-    "export": "writes poses for OpenCV, COLMAP, glTF, Blender, ROS, USD, CSV",
 }
 
 
@@ -91,6 +91,7 @@ def commands() -> None:
                                               how well devices must be mounted
     plan lens --mesh face.obj                 which lens and focus suit an object
     plan reconstruct face-plan/plan.json      a cloud from rendered or captured images
+    plan export face-plan --to mitsuba        scenes for a renderer that isn't ours
 
     Exit: 0 planned and checked, 1 a requirement is missed, 2 usage, 3 bad input,
     4 nothing can be served, 5 time limit, 130 interrupted.
@@ -98,7 +99,7 @@ def commands() -> None:
 
 
 for _command in (
-    *(rig_command, evaluate, verify, accept, show, reconstruct, tolerance),
+    *(rig_command, evaluate, verify, accept, show, reconstruct, tolerance, export),
     *(lens, rigs, schema, sample),
 ):
     commands.add_command(_command)

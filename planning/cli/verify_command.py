@@ -1,6 +1,7 @@
 """What `plan verify` does."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,14 @@ from geometry.files.readers import UNITS, load_mesh
 from geometry.mesh.mesh import TriangleMesh
 from geometry.parallel import n_threads
 from planning.model.plan import RigPlan
+from planning.verify.reconstruction.render.mitsuba.materials import Surface
+from planning.verify.reconstruction.render.mitsuba.path_traced import mitsuba
+from planning.verify.reconstruction.render.mitsuba.physics import Physics
+from planning.verify.reconstruction.render.photometry import assumed_light
+from planning.verify.reconstruction.scanner import Scanner
 from planning.verify.verification import verify_plan
 
-from .console import print_json, reporter
+from .console import given, print_json, reporter
 
 
 def verify_command(options: Mapping[str, Any]) -> int:
@@ -24,12 +30,14 @@ def verify_command(options: Mapping[str, Any]) -> int:
     if options["mesh"] is not None:
         mesh = _same_scale(options["mesh"], plan)
     truth = None if options["truth"] is None else RigPlan.load(options["truth"])
+    threads = options["threads"] or n_threads()
     verification = verify_plan(
         plan,
         mesh,
         truth=truth,
+        **_rendering(plan, options, threads),
         seed=options["seed"],
-        threads=options["threads"] or n_threads(),
+        threads=threads,
         progress=report,
     )
     if options["as_json"]:
@@ -37,6 +45,24 @@ def verify_command(options: Mapping[str, Any]) -> int:
     else:
         click.echo(verification.summary())
     return 0 if verification.passed else 1
+
+
+def _rendering(
+    plan: RigPlan, options: Mapping[str, Any], threads: int
+) -> dict[str, Any]:
+    """Return what Mitsuba is to render; nothing for the built-in renderer."""
+    if options["renderer"] == "builtin":
+        return {}
+    # Before the audit, which takes a minute.
+    mitsuba(threads)
+    physics = Physics(
+        surface=Surface(**given(options, "albedo", "texture")),
+        **given(options, "material", "bounces", "spp", "vignetting"),
+    )
+    light = replace(
+        assumed_light(Scanner.of(plan)), **given(options, "ambient", "gamma")
+    )
+    return {"physics": physics, "photometry": light}
 
 
 def _same_scale(path: Path, plan: RigPlan) -> TriangleMesh:

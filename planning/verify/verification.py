@@ -20,6 +20,8 @@ from planning.verify.reconstruction.check.comparison import PredictedSamples, co
 from planning.verify.reconstruction.check.result import Reconstruction
 from planning.verify.reconstruction.reconstruct import reconstruct
 from planning.verify.reconstruction.render.countdown import countdown
+from planning.verify.reconstruction.render.mitsuba.physics import Physics
+from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.scanner import Scanner
 
 _MM = 1e3
@@ -95,6 +97,8 @@ def verify_plan(
     *,
     check_pixels: bool = True,
     truth: RigPlan | None = None,
+    physics: Physics | None = None,
+    photometry: Photometry | None = None,
     seed: int | None = None,
     threads: int = 2,
     progress: Callable[[str], None] | None = None,
@@ -109,6 +113,9 @@ def verify_plan(
         check_pixels: Whether the reconstruction is run.
         truth: What really stands there; the plan by default. With it, or with another
             mesh, every limit of the check that isn't kept is a failure.
+        physics: What Mitsuba renders; None: the built-in renderer does. With it, too,
+            every limit that isn't kept is a failure.
+        photometry: Light and sensor; None: as the plan's check assumes.
         seed: Of the audit's samples and the pixel noise; the plan's own by default.
         threads: Worker threads; the result doesn't depend on them.
         progress: Receives a line when a stage begins.
@@ -134,9 +141,10 @@ def verify_plan(
     failures += contradictions(recorded, plan.requirements.check)
     if not check_pixels:
         return Verification(tuple(failures), audit, None)
-    pixels = _reconstruct(plan, audit, truth, other, seed, threads, say)
-    if truth is not None or other is not None:
-        # What is recorded is of the rig as planned.
+    how = {"photometry": photometry, "physics": physics}
+    pixels = _reconstruct(plan, audit, truth, other, seed, threads, say, how)
+    if truth is not None or other is not None or any(how.values()):
+        # What is recorded is of the rig as planned, by the built-in renderer.
         return Verification((*failures, *pixels.failures), audit, pixels)
     false = compare_figures(recorded, pixels.record())
     if recorded is not None and not recorded.passed and not false:
@@ -187,6 +195,7 @@ def _reconstruct(
     seed: int,
     threads: int,
     say: Callable[[str], None],
+    how: Mapping[str, Any],
 ) -> Reconstruction:
     standing = None if truth is None and mesh is None else Scanner.of(truth or plan)
     if standing is not None and mesh is not None:
@@ -204,6 +213,7 @@ def _reconstruct(
             n_cameras=len(believed.cameras),
             threads=threads,
         ),
+        **how,
     )
     possible = possible_at_floors(plan, case.samples, threads=threads)
     prediction = PredictedSamples(

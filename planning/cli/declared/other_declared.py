@@ -13,6 +13,7 @@ from planning.cli.console import (
     threads_option,
 )
 
+from .export_declared import check_rendering, rendering_options
 from .plan_declared import rig_command
 
 # What says which object and which rig there are.
@@ -36,10 +37,12 @@ _OF_OBJECTS = ("meshes", "files", "unit", "size_mm", "rig_name", "light")
 @click.option(
     "--seed", type=click.IntRange(0), help="Of the audit [default: the plan's]."
 )
+@rendering_options
 @threads_option
 @output_options
 def verify(**options: Any) -> None:  # noqa: ANN401
     """Recompute every claim from the files alone, then check from pixels."""
+    check_rendering(options)
     from planning.cli.verify_command import verify_command
 
     run(lambda: verify_command(options), debug=options["debug"])

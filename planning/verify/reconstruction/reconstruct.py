@@ -1,6 +1,7 @@
 """The simulated reconstruction: render, decode, triangulate, merge, compare."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 from geometry.mesh.sampling import sample_surface
 from planning.verify.reconstruction.check.accuracy import (
@@ -23,6 +24,8 @@ from planning.verify.reconstruction.faults.measured_clouds import (
     MeasuredClouds,
     rejection,
 )
+from planning.verify.reconstruction.render.mitsuba.decoded import decode_path_traced
+from planning.verify.reconstruction.render.mitsuba.physics import Physics
 from planning.verify.reconstruction.render.photometry import Photometry, assumed_light
 from planning.verify.reconstruction.render.rendered import (
     Progress,
@@ -44,6 +47,7 @@ def reconstruct(
     truth: Scanner | None = None,
     expected: Expected | None = None,
     photometry: Photometry | None = None,
+    physics: Physics | None = None,
     progress: Progress | None = None,
 ) -> Reconstruction:
     """Measure an object through rendered images, and judge the result.
@@ -58,10 +62,17 @@ def reconstruct(
             plan claims measured; those outside the target are left aside. By default
             fresh points of the target, whose completeness is reported but not judged.
         photometry: Simulated light and sensor; None: as the plan's check assumes.
+        physics: What Mitsuba renders; None: the built-in renderer does.
         progress: Called with the pairs done and their total.
+
+    Raises:
+        InputError: If Mitsuba is asked for and isn't installed, or lacks a lens.
     """
     light, spent = photometry or assumed_light(plan), Spent()
-    decoded = decode_rendered(
+    draw = decode_rendered
+    if physics is not None:
+        draw = partial(decode_path_traced, physics=physics)
+    decoded = draw(
         plan,
         truth or plan,
         light,

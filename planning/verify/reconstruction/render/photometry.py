@@ -26,6 +26,7 @@ class Photometry:
         read_noise: Standard deviation of the read noise, in grey levels of 255.
         exposure: Share of full scale that the brightest pixels reach.
         noisy: Whether noise is added; frames are quantised to 8 bits if so.
+        gamma: Of the camera: a share x of full scale is reported as x^(1 / gamma).
     """
 
     projector_blur_m: float = 0.25e-3
@@ -36,6 +37,7 @@ class Photometry:
     read_noise: float = 1.0
     exposure: float = 0.85
     noisy: bool = True
+    gamma: float = 1.0
 
     @property
     def pixel_noise(self) -> float:
@@ -88,7 +90,8 @@ class Photometry:
         """Return what the sensor reports of an image.
 
         Shot noise and read noise, ``var = 255 grey / full_well + read_noise^2`` in grey
-        levels; clipped and rounded to 8 bits. Noise-free frames are not quantised.
+        levels; clipped, put through gamma and rounded to 8 bits. Noise-free frames are
+        not quantised.
 
         Args:
             grey: Irradiance, shape (h, w).
@@ -97,13 +100,20 @@ class Photometry:
         """
         level = grey * np.float32(gain)
         if not self.noisy:
-            return level
+            return self._reported(level)
         rng = np.random.Generator(np.random.SFC64(np.random.SeedSequence(key)))
         noise = rng.standard_normal(level.shape, dtype=np.float32)
         variance = level * np.float32(255.0 / self.full_well)
         variance += np.float32(self.read_noise**2)
         level += noise * np.sqrt(variance)
-        return np.clip(np.rint(level), 0.0, 255.0).astype(np.uint8)
+        reported = self._reported(np.clip(level, 0.0, 255.0))
+        return np.clip(np.rint(reported), 0.0, 255.0).astype(np.uint8)
+
+    def _reported(self, level: Grey) -> Grey:
+        if self.gamma == 1.0:
+            return level
+        share = np.maximum(level, 0.0) * np.float32(1.0 / 255.0)
+        return np.float32(255.0) * share ** np.float32(1.0 / self.gamma)
 
 
 def assumed_light(scanner: Scanner) -> Photometry:

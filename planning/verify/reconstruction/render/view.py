@@ -62,10 +62,11 @@ def view(
 
     None if it sees nothing of the mesh.
     """
-    window = _window(camera, mesh)
+    window = object_window(camera, mesh)
     if window is None:
         return None
-    (left, top), shape = window
+    left, top, *size = window
+    shape = size[1], size[0]
     away = float(np.linalg.norm(mesh.centre - camera.centre))
     sharp = photometry.projector_blur_m * camera.focal_px < _SHARP_PX * away
     fold = 2 if sharp else 1
@@ -106,10 +107,13 @@ def view(
     )
 
 
-def _window(
+def object_window(
     camera: CameraCalibration, mesh: TriangleMesh
-) -> tuple[tuple[int, int], tuple[int, int]] | None:
-    """Corner (u, v) and shape (rows, columns) of the image part that holds the mesh."""
+) -> tuple[int, int, int, int] | None:
+    """Return the part of the image that holds a mesh; None: it isn't in the image.
+
+    Left, top, columns and rows.
+    """
     pixels = camera.project(mesh.corners.reshape(-1, 3))
     low, high = np.array([0, 0]), np.array(camera.resolution) - 1
     if np.all(np.isfinite(pixels)):
@@ -120,7 +124,7 @@ def _window(
     columns, rows = (int(side) for side in high - low + 1)
     if columns < 1 or rows < 1:
         return None
-    return (int(low[0]), int(low[1])), (rows, columns)
+    return int(low[0]), int(low[1]), columns, rows
 
 
 def _cast(
