@@ -1,7 +1,9 @@
-"""What `plan rigs`, `plan schema` and `plan sample` do."""
+"""What `plan rigs`, `plan schema`, `plan sample` and `plan export` do."""
 
+from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -13,7 +15,14 @@ from geometry.shapes.sample_head.sample_head import (
     sample_head,
 )
 from planning.model.files import write_atomically
+from planning.model.plan import RigPlan
+from planning.model.words import count_words
 from planning.rig.rig_files import list_presets, preset_text
+from planning.verify.reconstruction.render.mitsuba.materials import Surface
+from planning.verify.reconstruction.render.mitsuba.scene_files import write_scenes
+from planning.verify.reconstruction.scanner import Scanner
+
+from .console import given, print_json, reporter, writable
 
 
 def rigs_command(name: str | None) -> int:
@@ -68,3 +77,25 @@ def write_sample(
     text = head_as_obj(mesh, "open at the neck")
     write_atomically(Path(path), lambda file: file.write(text.encode("ascii")))
     return mesh
+
+
+def export_command(options: Mapping[str, Any]) -> int:
+    """Write a scene for each projector of a plan; print where they are."""
+    path, report = Path(options["plan_file"]), reporter(quiet=options["quiet"])
+    scanner = Scanner.of(RigPlan.load(path))
+    folder = options["output"] or path.parent / options["target"]
+    with writable(folder):
+        report("drawing the patterns")
+        scenes = write_scenes(
+            scanner,
+            folder,
+            Surface(**given(options, "albedo", "texture")),
+            **{"ambient": scanner.limits.check.ambient} | given(options, "ambient"),
+        )
+    if options["as_json"]:
+        print_json({"folder": str(folder), "scenes": [str(scene) for scene in scenes]})
+    else:
+        names = ", ".join(scene.name for scene in scenes)
+        cameras = count_words(len(scanner.cameras), "camera")
+        click.echo(f"{folder}: {names} with {cameras} each, see README.txt")
+    return 0

@@ -127,6 +127,6 @@ def export(**options: Any) -> None:  # noqa: ANN401
             f"`plan export --to {options['target']}` isn't built yet; built is "
             f"{', '.join(_BUILT)}"
         )
-    from planning.cli.export_command import export_command
+    from planning.cli.other_commands import export_command
 
     run(lambda: export_command(options), debug=options["debug"])
