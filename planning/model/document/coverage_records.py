@@ -93,7 +93,7 @@ class RobustRecord(Part):
         least: So many make it as good as sure that the quantile of all rigs does.
         rounds: How often requirements were tightened.
         n_projectors_without: Projectors of the plan for exact rigs; likewise below.
-        n_met_without: Of `n_drawn_without`, those of its rigs that meet it.
+        n_met_without: Of as many of its rigs, those that meet it.
     """
 
     n_drawn: int
@@ -102,7 +102,6 @@ class RobustRecord(Part):
     rounds: int
     n_projectors_without: int
     n_cameras_without: int
-    n_drawn_without: int
     n_met_without: int
 
 

@@ -59,6 +59,6 @@ def robust_lines(plan: RigPlan) -> list[str]:
         lines += [
             f"planned for {', '.join(tighter)}",
             f"costs {' and '.join(more) or 'no device more'}; without it "
-            f"{found.n_met_without} of {found.n_drawn_without} rigs met it",
+            f"{found.n_met_without} of {found.n_drawn} rigs met it",
         ]
     return labelled("ROBUST", lines)

@@ -29,9 +29,9 @@ from .tolerance import draw
 
 Keep = Callable[[RigPlan], None]
 Planned = Callable[[PlanRequest, Stopwatch, Keep | None], tuple[RigPlan, PartialPlan]]
-# Rigs that a plan is held against, looked at in so many pieces: the first ones often
-# show that a plan isn't robust by far.
-_RIGS, _PIECES = 400, 4
+# Rigs that a plan is held against: fewer tell a quantile too roughly, and what is asked
+# too tight costs cameras.
+_RIGS = 400
 # How unlikely it must be that as many rigs meet what less than the quantile meets.
 _DOUBT = 0.05
 _ROUNDS = 5
@@ -49,10 +49,6 @@ class _Round:
     partial: PartialPlan
     rigs: tuple[Figures, ...]
     n_met: int
-
-    @property
-    def share(self) -> float:
-        return self.n_met / len(self.rigs)
 
 
 def least_met(quantile: float, n: int) -> int:
@@ -84,7 +80,8 @@ def robustly(planned: Planned) -> Planned:
                 request = replace(request, wishes=wishes)
                 latest = planned(request, clock, keep)
                 if latest[0].document.truncated:
-                    break
+                    # The one before is whole, and better known.
+                    return _cut(rounds[-1].plan), rounds[-1].partial
         except InfeasibleLimitsError as error:
             clock.say(f"  nothing tighter can be planned: {error}")
         except KeyboardInterrupt:
@@ -120,25 +117,15 @@ def _with(plan: RigPlan, robust: Robust) -> RigPlan:
 def _drawn(
     plan: RigPlan, partial: PartialPlan, robust: Robust, clock: Stopwatch
 ) -> _Round:
-    """Hold drawn rigs against what is asked, until it is clear how they fare."""
+    """Hold drawn rigs against what is asked."""
     plan, threads = _with(plan, robust), partial.request.threads
     errors = plan.requirements.triangulation.calibration or PERFECT
     question = Question("", robust.mounting, errors, plan.document.seed)
-    asked, spare = (
-        Asked.of(plan.requirements),
-        _RIGS - least_met(robust.quantile, _RIGS),
-    )
-    rigs: list[Figures] = []
-    n_met = 0
+    asked = Asked.of(plan.requirements)
     with clock.stage("robust", "rigs that aren't built exactly as planned"):
         case = BuiltCase.of(plan, threads=threads).shared()
-        for piece in range(_PIECES):
-            some = range(_RIGS * piece // _PIECES, _RIGS * (piece + 1) // _PIECES)
-            rigs += draw(case, question, some, threads=threads, stream=PLANNING)
-            n_met = sum(not asked.missed(rig) for rig in rigs)
-            clock.check()
-            if len(rigs) - n_met > spare:
-                break
+        rigs = draw(case, question, range(_RIGS), threads=threads, stream=PLANNING)
+        n_met = sum(not asked.missed(rig) for rig in rigs)
         clock.say(f"  {n_met} of {len(rigs)} drawn rigs meet what is asked")
     return _Round(plan, partial, tuple(rigs), n_met)
 
@@ -147,12 +134,11 @@ def _tightened(drawn: _Round, wishes: Wishes, asked: Requirements) -> Wishes | N
     """Return wishes for what too many rigs miss; None: enough meet it, or it is in
     vain.
     """  # noqa: D205 - as short as it gets
-    quantile, n = wishes.robust or 0.0, len(drawn.rigs)
-    spare = _RIGS - least_met(quantile, _RIGS)
-    if n == _RIGS and n - drawn.n_met <= spare:
+    spare = _RIGS - least_met(wishes.robust or 0.0, _RIGS)
+    if _RIGS - drawn.n_met <= spare:
         return None
     goals, required = Asked.of(drawn.plan.requirements), drawn.plan.requirements
-    short = _short(drawn.rigs, goals, spare * n // _RIGS)
+    short = _short(drawn.rigs, goals, spare)
     changes: dict[str, float] = {}
     for name, key, now in (
         ("lit", "dominant_coverage", required.dominant_coverage),
@@ -174,7 +160,7 @@ def _short(rigs: Sequence[Figures], asked: Asked, spare: int) -> dict[str, float
     Several figures share what is to spare: each may be missed by other rigs.
     """
     missed = [name for rig in rigs for name in asked.missed(rig)]
-    names = [name for name in dict.fromkeys(missed) if missed.count(name) > 0]
+    names = list(dict.fromkeys(missed))
     each = spare // max(len(names), 1)
     found: dict[str, float] = {}
     for name in names:
@@ -188,15 +174,14 @@ def _short(rigs: Sequence[Figures], asked: Asked, spare: int) -> dict[str, float
 def _recorded(rounds: Sequence[_Round], robust: Robust) -> tuple[RigPlan, PartialPlan]:
     """The plan whose rigs fare best, with what it costs."""
     first = rounds[0]
-    best = max(rounds, key=lambda one: (one.share, len(one.rigs)))
+    best = max(rounds, key=lambda one: one.n_met)
     record = RobustRecord(
-        n_drawn=len(best.rigs),
+        n_drawn=_RIGS,
         n_met=best.n_met,
-        least=least_met(robust.quantile, len(best.rigs)),
+        least=least_met(robust.quantile, _RIGS),
         rounds=rounds.index(best),
         n_projectors_without=len(first.plan.projectors),
         n_cameras_without=len(first.plan.cameras),
-        n_drawn_without=len(first.rigs),
         n_met_without=first.n_met,
     )
     document = best.plan.document.changed(robust=record)
