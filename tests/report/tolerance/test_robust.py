@@ -113,7 +113,7 @@ def test_accuracy_and_shares_are_tightened_until_the_quantile_holds(plan, monkey
     assert record.n_met_without < 0.9 * record.n_drawn
     assert 1 <= record.rounds == len(planner.wishes) - 1 <= 5
     before = plan.requirements
-    assert required.coverage - before.coverage == pytest.approx(0.02, abs=0.01)
+    assert required.coverage - before.coverage == pytest.approx(0.019, abs=0.005)
     ratio = required.triangulation.max_sigma_m / before.triangulation.max_sigma_m
     assert 0.85 < ratio < 0.97
     assert Asked.of(required) == Asked.of(before)

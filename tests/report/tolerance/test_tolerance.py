@@ -63,6 +63,35 @@ def test_as_planned_all_is_as_the_plan_claims(plan, case):
     )
     assert figures.completeness == 1.0
     assert figures.rms_m < 1e-12
+    everywhere = case.figures(case.planned, np.zeros(len(case.target)))
+    assert everywhere.completeness == 1.0
+    beyond = case.figures(case.planned, np.full(len(case.target), 1.0))
+    assert beyond.completeness == 0.0
+
+
+def test_points_of_exact_rigs_have_their_edge_noise(plan):
+    case = BuiltCase.of(plan, PERFECT, threads=1)
+    rigs = draw(case, question_of(plan, AS_PLANNED, PERFECT, 0), range(20), threads=1)
+    rms = np.sqrt(np.mean([rig.rms_m**2 for rig in rigs]))
+    assert rms == pytest.approx(case.predicted_rms_m(), rel=0.06)
+    assert all(rig.p95_m == pytest.approx(1.96 * rms, rel=0.4) for rig in rigs)
+
+
+def test_drawn_rigs_are_judged_by_what_was_asked_not_by_what_was_planned(
+    handmade, plan, case
+):
+    required = plan.requirements
+
+    def tighten(document):
+        names = ("dominant_coverage", "coverage", "region_coverage")
+        asked = {name: getattr(required, name) for name in names}
+        asked |= {"quantile": 0.95, "mounting": {}}
+        asked["max_sigma_m"] = required.triangulation.max_sigma_m
+        document["requirements"]["robust"] = asked
+        document["requirements"]["triangulation"]["max_sigma_m"] = 1e-6
+
+    tight = BuiltCase.of(handmade.tampered(plan, tighten), _OFF, threads=1)
+    assert np.array_equal(tight.planned.measured, case.planned.measured)
 
 
 def test_errors_over_many_rigs_are_those_that_first_order_predicts(plan, case):
@@ -151,6 +180,8 @@ def test_a_longer_study_goes_on_from_a_shorter_one(plan, tmp_path, monkeypatch):
     assert len(StudyFile(tmp_path / "tolerance.json", other).study.rigs) == 2
     gone = StudyFile(tmp_path / "tolerance.json", replace(question, plan="another"))
     assert gone.study.rigs == ()
+    gone.save(gone.study)
+    assert StudyFile(tmp_path / "tolerance.json", other).study.rigs == ()
 
 
 def test_what_is_drawn_stays_when_a_run_is_interrupted(plan, tmp_path, monkeypatch):
@@ -195,6 +226,10 @@ def test_loosest_mounting_is_the_quantile_of_what_each_rig_bears(quantile):
         # |u| is uniform: the share that is good at a bound b is 1 mm / b.
         assert found.mounting.position_m == pytest.approx(1e-3 / quantile, rel=0.08)
         assert found.n_met >= quantile * 400
+    for seed in range(8):
+        found = loosest(case, asked, Mounting(1e-3), quantile, n=40, seed=seed)
+        assert found.n_met >= quantile * found.n_confirming == quantile * 40
+        assert found.scale > 0.0
     never = Asked(0.9, 1.1, 0.5, 0.9, None)
     assert loosest(case, never, Mounting(1e-3), 0.5, n=8, seed=0).scale == 0.0
     always = Asked(0.9, 0.0, 0.5, 0.9, None)
@@ -248,5 +283,21 @@ def test_sensitivities_are_those_of_errors_planted_one_by_one(plan, case):
     assert max(one.coverage for one in by_name.values()) > 0.0
     expected = first_order(case, found, _LOOSE)
     assert expected.coverage_deviation > 0.0
+    by = np.zeros((len(case.rig.devices), 7))
+    by[0, 4] = _LOOSE.angle
+    own = slice(0, case.n_target)
+    there, back = (
+        case.outcome(case.rig.moved(sign * by)).measured[own].sum() for sign in (1, -1)
+    )
+    whole, steps = case.by_cameras[own].sum(), _LOOSE.angle / np.radians(0.1)
+    pan = by_name["P1", "pan"]
+    before = case.planned.measured[own].sum()
+    assert pan.slope == pytest.approx((there - back) / whole / (2.0 * steps))
+    assert pan.bend == pytest.approx((there + back - 2.0 * before) / whole / steps**2)
+    alone = first_order(case, [pan], _LOOSE)
+    # The variance of a uniform deviate is a third of its bound's square.
+    variance = steps**2 / 3.0
+    assert alone.coverage_deviation == pytest.approx(abs(pan.slope) * variance**0.5)
+    assert alone.coverage_shift == pytest.approx(0.5 * pan.bend * variance)
     none = first_order(case, found, AS_PLANNED)
     assert none.coverage_deviation == none.near_limits == 0.0

@@ -7,13 +7,17 @@ import pytest
 from support.factories import make_camera, make_projector, make_rig
 from support.simulated_rigs import off_by, triangulated
 
-from geometry.poses import look_at
+from geometry.poses import inverse, look_at
+from planning.model.calibration_errors import Mounting
 from planning.model.device_poses import moved_to
 from planning.verify.audit.audit_case import examine
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.coverage import robust_claims
+from planning.verify.audit.coverage.sigma_claims import _best_pairs
 from planning.verify.audit.predicates.audit_devices import AuditCamera, AuditProjector
-from planning.verify.audit.predicates.built_rigs import retriangulated
+from planning.verify.audit.predicates.built_rigs import built_rig, retriangulated
+from planning.verify.audit.predicates.error_terms import deviation
+from planning.verify.audit.predicates.recompute import recompute
 
 _MET = {"n_drawn": 400, "n_met": 400, "least": 388, "rounds": 0} | {
     f"n_{name}_without": 2 for name in ("projectors", "cameras", "met")
@@ -94,6 +98,45 @@ def test_one_record_without_the_other_says_nothing(handmade, case):
     findings = AuditFindings()
     robust_claims.audit_robust(replace(case, plan=plan), findings)
     assert "without the other" in findings.failures[0]
+
+
+def test_devices_move_with_their_rings_and_existing_ones_stay(handmade):
+    plan = handmade.build_plan()
+    first, *others = plan.document.projectors
+    records = (first.changed(existing=True, name="old"), *others)
+    plan = replace(plan, document=plan.document.changed(projectors=records))
+    rig = built_rig(plan, Mounting(1e-2, 1e-2, 1e-2), np.random.default_rng(0))
+    before, after = plan.projectors, rig.plan.projectors
+    assert np.array_equal(before[0].world_from_device, after[0].world_from_device)
+    old, new = (
+        inverse(p.world_from_device) @ p.world_from_ring for p in (before[1], after[1])
+    )
+    assert np.abs(old - new).max() < 1e-9
+    moved = inverse(before[1].world_from_device) @ after[1].world_from_device
+    assert 0.0 < np.abs(moved[:3, 3]).max() <= 1e-2
+    assert np.abs(after[1].world_from_ring - before[1].world_from_ring).max() > 1e-4
+    ratio = after[1].device.camera_matrix[0, 0] / before[1].device.camera_matrix[0, 0]
+    assert 0.0 < abs(ratio - 1.0) <= 1e-2
+
+
+def test_errors_of_many_rigs_are_those_that_are_predicted(handmade, case):
+    def state(document):
+        limits = document["requirements"]["triangulation"]
+        limits |= {"max_sigma_m": 1e-3, "calibration": calibration}
+
+    calibration = {"angle": 3e-4, "position_m": 1e-4, "focal": 0.0, "principal_px": 0.2}
+    plan = handmade.tampered(handmade.build_plan(), state)
+    samples = case.samples.take(case.samples.in_target)
+    squares = []
+    for index in range(60):
+        rng = np.random.default_rng(index)
+        rig = built_rig(plan, Mounting(), rng)
+        found = recompute(rig.plan, samples, case.shadow)
+        errors = robust_claims._errors(rig, found, rng)
+        squares.append(np.nanmean(errors**2))
+    best = _best_pairs(replace(case, plan=plan, actual=found))
+    predicted = np.sqrt(np.mean(deviation(best) ** 2))
+    assert np.sqrt(np.mean(squares)) == pytest.approx(predicted, rel=0.12)
 
 
 @pytest.mark.parametrize("light", ["diverging", "parallel"])

@@ -58,8 +58,6 @@ def audit_robust(case: AuditCase, findings: AuditFindings) -> None:
     share = record.n_met / max(record.n_drawn, 1)
     error = np.sqrt(share * (1.0 - share) / max(record.n_drawn, 1))
     claimed = max(share - _ERRORS * error, 0.0)
-    if record.n_met >= record.least:
-        claimed = max(claimed, robust.quantile)
     met = _rigs_that_meet(case, robust)
     below.holds(
         binom.cdf(met, _RIGS, claimed) >= _SELDOM,
