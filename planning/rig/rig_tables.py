@@ -5,9 +5,10 @@ means: `docs/reference/rig-files.md`.
 """
 
 import math
+from itertools import pairwise
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from planning.model.bodies import BodyTable, MountTable
 from planning.model.calibration_errors import (
@@ -117,6 +118,33 @@ class PinholeTable(SourcedTable):
         return self
 
 
+def _check_response(response: float | list[float] | None) -> float | list[float] | None:
+    if not isinstance(response, list):
+        return response
+    steps = [after - before for before, after in pairwise(response)]
+    if len(response) < 2 or min(steps) < 0.0 or not response[-1] > response[0]:
+        raise ValueError(
+            f"response of {len(response)} levels must be measured light from black to "
+            f"white at 2 or more evenly spaced grey levels, never falling; or write "
+            f"one number, the gamma: 1 is linear"
+        )
+    return response
+
+
+Response = Annotated[
+    Annotated[float, Field(gt=0.0, le=10.0)]
+    | Annotated[list[Annotated[float, Field(ge=0.0)]], Field(max_length=4096)]
+    | None,
+    AfterValidator(_check_response),
+]
+
+
+class ProjectorTable(PinholeTable):
+    """A projector of diverging light, `[projector]`."""
+
+    response: Response = None
+
+
 class CameraTable(PinholeTable):
     """A camera, `[camera]`."""
 
@@ -131,6 +159,7 @@ class ParallelTable(SourcedTable):
     range_mm: PositivePair
     beam_radius_mm: Positive | None = None
     frame_rate_hz: Rate | None = None
+    response: Response = None
 
     @model_validator(mode="after")
     def _check_range(self) -> Self:
@@ -274,7 +303,7 @@ class RigTable(Table):
     description: str = ""
     light: Literal["diverging", "parallel"] = "diverging"
     camera: CameraTable
-    projector: PinholeTable | None = None
+    projector: ProjectorTable | None = None
     parallel_projector: ParallelTable | None = None
     placement: PlacementTable = PlacementTable()
     rings: RingsTable = RingsTable()

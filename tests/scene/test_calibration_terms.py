@@ -109,7 +109,7 @@ def _seen_by(source, camera, target):
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     index, one = np.zeros(1, dtype=np.int16), np.ones(1)
     where = points, rays, rays, eye.project(points)
-    return Cloud(*where, index, index, index, one, rays, one, one)
+    return Cloud(*where, index, index, index, one, rays, one, one, one)
 
 
 def test_noise_alone_is_limited_where_that_is_asked():

@@ -108,6 +108,7 @@ class FiguresRecord(Part):
     pixel_um: float | None = None
     frame_rate_hz: float | None = None
     exposure_ms: float | None = None
+    response: float | tuple[float, ...] | None = None
     pixel_pitch_mm: float | None = None
     range_mm: Interval | None = None
     beam_radius_mm: float | None = None

@@ -12,6 +12,7 @@ import numpy as np
 from geometry.devices import ParallelModel
 from planning.model.bodies import Body
 from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.verify.reconstruction.patterns.response import Response
 from planning.verify.reconstruction.patterns.ring_patterns import (
     DrawnRings,
     RingsForCamera,
@@ -134,11 +135,13 @@ class ProjectorCalibration(DeviceCalibration):
         world_from_ring: Pose of the ring frame [m], shape (4, 4).
         beam_radius: Radius of a parallel beam about the device's axis [m]; None: none.
         pattern: What it draws.
+        response: Light of its grey levels.
     """
 
     world_from_ring: Array
     beam_radius: float | None
     pattern: DrawnRings
+    response: Response = field(default=Response(), kw_only=True)
 
     @property
     def light(self) -> LightLaw:
@@ -197,6 +200,12 @@ class ProjectorCalibration(DeviceCalibration):
         shrink = self.light.shrink(np.where(z > 0.0, z, 1.0))
         flat = local[:, :2] * np.where(z > 0.0, shrink, np.nan)[:, None]
         return self._pixels(flat), z
+
+    def pixel_m(self, points: Array) -> Array:
+        """Return how wide a pixel is at world points (n, 3), across the beam [m]."""
+        depth = (points - self.centre) @ self.axis
+        scale = float(np.sqrt(self.matrix[0, 0] * self.matrix[1, 1]))
+        return 1.0 / (scale * self.light.shrink(depth))
 
     def in_panel(self, pixels: Array, margin_px: float = 0.0) -> Mask:
         """Return whether pixels (n, 2) are drawn: in the image and in the beam."""

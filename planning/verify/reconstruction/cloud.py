@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from .arrays import Array, Columns
 
-# Shift of edges by texture under the blur of a lens [px], error of a normal [rad].
-TEXTURE_PX, _NORMAL_RAD = 0.015, 0.1
+# Error of a normal that is estimated from the points around [rad].
+_NORMAL_RAD = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +28,8 @@ class Cloud(Columns):
             in [m/px], shape (n, 3).
         noise_px: Standard deviation of the edge's position across itself [px], (n,).
         blur_px: That of the edge's blur [px]; NaN: unknown, shape (n,).
+        bias_px: What the edge may be off beside its noise, across itself, the same in
+            every image: standard deviation [px], shape (n,).
     """
 
     points: Array
@@ -41,6 +43,7 @@ class Cloud(Columns):
     shift: Array
     noise_px: Array
     blur_px: Array
+    bias_px: Array
 
     def of_devices(self, projector: int, camera: int) -> "Cloud":
         """Return the points with these indices of their devices."""
@@ -58,11 +61,11 @@ class Cloud(Columns):
     def sigma(self, normals: Array) -> Array:
         """Return the standard deviation [m] of each point along a normal, (n,).
 
-        Grey noise isn't all: where brightness changes across an edge, the blur of the
-        lens moves it, and normals are estimated from few points around. Without both
-        the surest points would seem surer than they are (docs/method/accuracy.md).
+        Grey noise isn't all: edges are biased, and normals are estimated from few
+        points around. Without both the surest points would seem surer than they are
+        (docs/method/accuracy.md).
         """
-        return self.per_pixel(normals) * np.hypot(self.noise_px, TEXTURE_PX)
+        return self.per_pixel(normals) * np.hypot(self.noise_px, self.bias_px)
 
     def per_pixel(self, normals: Array) -> Array:
         """Return how far each point moves along a normal with its edge [m/px], (n,).
@@ -78,4 +81,5 @@ class Cloud(Columns):
         vectors, numbers = np.zeros((0, 3)), np.zeros(0)
         pixels, index = np.zeros((0, 2)), np.zeros(0, dtype=np.int16)
         places, devices = (vectors, vectors, vectors, pixels), (index, index, index)
-        return Cloud(*places, *devices, numbers, vectors, numbers, numbers)
+        columns = numbers, vectors, numbers, numbers, numbers
+        return Cloud(*places, *devices, *columns)

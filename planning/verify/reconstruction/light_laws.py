@@ -91,6 +91,10 @@ class LightLaw:
         """Return lengths along the beam [m] for one of the chart at depths z."""
         return np.ones_like(depth)
 
+    def gradients(self, p: Array, depth: Array) -> Array:
+        """Return the gradients of p in the frame [1/m], shape (n, 2, 3)."""
+        return np.broadcast_to(np.eye(2, 3), (len(p), 2, 3))
+
     def slope_run(self, rho: Array, depth: Array) -> tuple[Array, Array]:
         """Return (s, t) whose |dt / ds| is tan(incidence) across rings: |p| and z.
 
@@ -147,6 +151,11 @@ class _Diverging(LightLaw):
 
     def chart_m(self, rho: Array, depth: Array) -> Array:
         return depth**2 * np.sqrt(1.0 + rho**2)
+
+    def gradients(self, p: Array, depth: Array) -> Array:
+        slopes = np.tile(np.eye(2, 3), (len(p), 1, 1))
+        slopes[:, :, 2] = -p
+        return slopes / depth[:, None, None]
 
     def slope_run(self, rho: Array, depth: Array) -> tuple[Array, Array]:
         return np.arctan(rho), np.log(depth * np.sqrt(1.0 + rho**2))

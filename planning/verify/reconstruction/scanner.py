@@ -1,7 +1,7 @@
 """A rig as the simulated reconstruction takes it: devices, limits and the object."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -11,6 +11,7 @@ from planning.model.calibration_errors import CalibrationErrors
 from planning.model.obstacles import Obstacle
 from planning.model.plan import RigPlan
 from planning.model.requirements import CheckLimits
+from planning.verify.reconstruction.patterns.response import Response
 from planning.verify.reconstruction.patterns.ring_patterns import Frame
 
 from .arrays import Array, Indices, Mask
@@ -137,9 +138,13 @@ class Scanner:
     def of(cls, plan: RigPlan) -> Self:
         """Return what a plan says."""
         document, wanted = plan.document, plan.requirements
+        response = Response(document.rig.projector.figures.response or 1.0)
         schedule = document.firing_schedule
         return cls(
-            tuple(calibrate_projector(projector) for projector in plan.projectors),
+            tuple(
+                replace(calibrate_projector(projector), response=response)
+                for projector in plan.projectors
+            ),
             tuple(calibrate_camera(camera) for camera in plan.cameras),
             plan.surface.mesh,
             plan.surface.region,

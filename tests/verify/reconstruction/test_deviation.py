@@ -82,7 +82,11 @@ def plate_map(limits_m=None, align="none"):
     points = np.column_stack([grid, np.where(left, 3e-4, -1e-4)])
     n = len(points)
     cloud = replace(
-        Cloud.empty(), points=points, noise_px=np.ones(n), shift=np.zeros((n, 3))
+        Cloud.empty(),
+        points=points,
+        noise_px=np.ones(n),
+        bias_px=np.zeros(n),
+        shift=np.zeros((n, 3)),
     )
     up = np.tile([0.0, 0.0, 1.0], (n, 1))
     merged = merged_as(cloud, up)
@@ -142,7 +146,11 @@ def test_what_the_fit_did_is_told_and_points_and_normals_went_along(waved):
     points = transform(moved, found.points)
     n = len(points)
     cloud = replace(
-        Cloud.empty(), points=points, noise_px=np.ones(n), shift=np.zeros((n, 3))
+        Cloud.empty(),
+        points=points,
+        noise_px=np.ones(n),
+        bias_px=np.zeros(n),
+        shift=np.zeros((n, 3)),
     )
     normals = found.normals @ moved[:3, :3].T
     merged = merged_as(cloud, normals)

@@ -129,6 +129,7 @@ def test_only_a_point_whose_ray_meets_its_ring_on_the_mesh_has_a_wrong_root(plan
         shift=rays,
         noise_px=numbers,
         blur_px=numbers,
+        bias_px=numbers,
     )
     order = np.argsort(rho)
     words = "P1 with C1: 100 % of the points took the wrong one of the two roots"

@@ -133,7 +133,7 @@ def ring_points(light: str):
 def labelled(pixels: np.ndarray, *rig, tolerance_m: float):
     n = len(pixels)
     lines = ImageEdges(
-        pixels, np.full(n, -1), np.zeros(n, np.int8), pixels, *np.zeros((2, n))
+        pixels, np.full(n, -1), np.zeros(n, np.int8), pixels, *np.zeros((3, n))
     )
     return label_by_prior(lines, *rig, tolerance_m=tolerance_m)
 

@@ -203,7 +203,9 @@ class CloudFile:
 def _noise(merged: Merged) -> Array:
     """Standard deviations of noise along the normal, without one the largest [m]."""
     cloud = merged.cloud
-    largest = np.linalg.norm(cloud.shift, axis=1) * cloud.noise_px
+    largest = np.linalg.norm(cloud.shift, axis=1) * np.hypot(
+        cloud.noise_px, cloud.bias_px
+    )
     return np.where(np.isfinite(merged.normals[:, 0]), merged.sigma, largest)
 
 

@@ -18,6 +18,7 @@ from planning.verify.reconstruction.decode.lit_image import LitImage
 from planning.verify.reconstruction.scanner import Scanner
 
 from .calibration_sigma import calibration_sigma, camera_px
+from .lattice import lattice_px
 from .overlaps import compare_overlaps, pixel_sizes
 from .ring_curves import RingCurves
 from .tiles import Tiles, plane_normals
@@ -103,6 +104,9 @@ def merge(
         seen = np.flatnonzero((cloud.camera == camera) & ~steps)
         tiles = Tiles.of(cloud.pixels[seen], pitch_px)
         normals[seen] = plane_normals(fitted.points[seen], cloud.rays[seen], tiles)
+    lattice = lattice_px(fitted, normals, plan)
+    bias_px = np.where(doubtful, 0.0, np.hypot(cloud.bias_px, np.nan_to_num(lattice)))
+    fitted = replace(fitted, bias_px=bias_px)
     # In a step there is no surface whose normal would make an error less.
     largest = np.linalg.norm(fitted.shift, axis=1) * fitted.noise_px
     sigma = np.where(doubtful, largest, fitted.sigma(normals))

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.verify.reconstruction.arrays import Array, Indices, Mask
-from planning.verify.reconstruction.cloud import TEXTURE_PX, Cloud
+from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.scanner import Scanner
 
 from .overlaps import pixel_sizes
@@ -67,7 +67,7 @@ class RingCurves:
         """Lay a cloud along its rings."""
         angle, radius, depth = np.empty((3, len(cloud)))
         slide = np.empty((len(cloud), 2))
-        noise = np.hypot(cloud.noise_px, TEXTURE_PX)
+        noise = np.hypot(cloud.noise_px, cloud.bias_px)
         for p, projector in enumerate(plan.projectors):
             chosen = np.flatnonzero(cloud.projector == p)
             points, beams = cloud.points[chosen], cloud.beams[chosen]

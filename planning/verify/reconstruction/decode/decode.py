@@ -244,4 +244,5 @@ def _cloud(
         shift=moved - (slide / hits.conditioning)[:, None] * rays,
         noise_px=edges.noise_px,
         blur_px=edges.blur_px,
+        bias_px=edges.bias_px,
     )

@@ -34,6 +34,8 @@ _MIN_CERTAINTY = 0.18
 _MIN_EVENNESS = 0.6
 # Beyond this an edge is saturated, and its probit says nothing.
 _MAX_LEVEL = 0.98
+# Blur of a lens and its pixels that shifts edges where brightness changes [px].
+_LENS_PX = 0.7
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +49,7 @@ class ImageEdges(Columns):
         across: Unit direction in the image across the edge, shape (n, 2).
         noise_px: Standard deviation of the position along `across` [px], shape (n,).
         blur_px: That of the blur of the edge along it [px]; NaN: unknown, shape (n,).
+        bias_px: What brightness that changes across the edge may shift it [px], (n,).
     """
 
     pixels: Array
@@ -55,13 +58,14 @@ class ImageEdges(Columns):
     across: Array
     noise_px: Array
     blur_px: Array
+    bias_px: Array
 
     @classmethod
     def nothing(cls) -> "ImageEdges":
         """Return no edges."""
         places, numbers = np.zeros((0, 2)), np.zeros(0)
         rings, roots = numbers.astype(np.int64), numbers.astype(np.int8)
-        return cls(places, rings, roots, places, numbers, numbers)
+        return cls(places, rings, roots, places, numbers, numbers, numbers)
 
 
 def find_edges(
@@ -200,15 +204,30 @@ def _crossings(reader: _Reader, noise: float) -> tuple[ImageEdges, Indices]:
     along, cross = along[good].astype(np.float64), cross[good].astype(np.float64)
     slope = np.hypot(along, cross)
     contrast = 0.5 * (reader.contrast[i, j] + reader.contrast[i, j + 1])
+    uneven = _unevenness(reader.contrast, i, j, along / slope, cross / slope)
+    grey = np.sqrt(2.0) * noise / contrast * spread * np.abs(along) / slope
     edges = ImageEdges(
         np.column_stack([j + zero, i.astype(np.float64)]),
         rings[good],
         np.where(root[good] > 0.0, 1, -1).astype(np.int8),
         np.column_stack([along, cross]) / slope[:, None],
-        np.sqrt(2.0) * noise / contrast * spread * np.abs(along) / slope,
+        grey,
         blur * np.abs(along) / slope,
+        _LENS_PX**2 * uneven,
     )
     return edges, np.array([flips, named])
+
+
+def _unevenness(
+    contrast: Grey, i: Indices, j: Indices, across: Array, down: Array
+) -> Array:
+    """Return |d ln(contrast)| a pixel across an edge between (i, j) and (i, j + 1)."""
+    right = contrast[i, j + 1] + contrast[i, j + 2]
+    left = contrast[i, j] + contrast[i, j - 1]
+    below, above = (contrast[i + d, j] + contrast[i + d, j + 1] for d in (1, -1))
+    rise = across * (right - left) / (right + left)
+    rise += down * (below - above) / (below + above)
+    return np.abs(rise)
 
 
 def _count_single(flipped: NDArray[np.int16], n_bits: int) -> Indices:

@@ -12,7 +12,6 @@ from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from planning.model.planned import code_bits
 from planning.verify.reconstruction.arrays import Array, Grey, Images, Indices, Mask
@@ -126,18 +125,6 @@ class DrawnRings:
         first = self.radii[0] - (self.radii[1] - self.radii[0])
         steps = np.diff(self.radii, prepend=first)
         return self.light.across_m(steps[rings], self.radii[rings], depth)
-
-    def blurred(self, rho: Array, spread: Array) -> tuple[Indices, Array, Array, Array]:
-        """Return how blurred light falls where |p| is rho, shape (n,) each.
-
-        The annulus; the share of the light from the next one inwards, and outwards; and
-        the share that is drawn at all. `spread` is the blur's standard deviation.
-        """
-        annulus = np.searchsorted(self.radii, rho)
-        edges = np.concatenate([[-np.inf], self.radii, [np.inf]])
-        inner = ndtr((edges[annulus] - rho) / spread)
-        outer = ndtr((rho - edges[annulus + 1]) / spread)
-        return annulus, inner, outer, ndtr((self.outer_radius - rho) / spread)
 
     def lines(self, width: float) -> Self:
         """Return rings whose odd annuli are bright lines on these.

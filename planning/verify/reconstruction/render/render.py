@@ -6,14 +6,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from planning.verify.reconstruction.arrays import Grey, Images, Indices
-from planning.verify.reconstruction.patterns.ring_patterns import Frames
+from planning.verify.reconstruction.patterns.panel import PanelCanvas, frame_levels
+from planning.verify.reconstruction.patterns.ring_patterns import (
+    Frame,
+    Frames,
+    RingsForCamera,
+)
 
+from .panel_light import PanelLight
 from .photometry import Photometry
 from .rendered_light import RenderedLight, Shown
 from .view import RenderedView
 
 # Blurred light reaches no further than this beyond the samples that are lit [px].
 _MARGIN_PX = 6
+# Whose root disc is drawn: the camera that looks.
+_CAMERA = "camera"
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +96,7 @@ def render_pair(
     around = seen.albedo[canvas.inside] * np.float32(photometry.ambient)
     ambient = canvas.image(around, canvas.inside, photometry)
     streams = [
-        _images(canvas, one, light, patterns.n_bits, photometry) for one, light in every
+        _images(canvas, one, light, patterns, photometry) for one, light in every
     ]
     whites = [next(images) for images in streams]
     gain = photometry.gain(float(np.percentile(whites[0] + ambient, 99.9)))
@@ -97,12 +105,9 @@ def render_pair(
     stack: Images = np.empty((patterns.n_frames, *canvas.shape), dtype=kind)
     stack[0] = photometry.capture(white + ambient, (*seed, 0), gain)
     stack[1] = photometry.capture(ambient, (*seed, 1), gain)
-    for index, images in enumerate(zip(*streams, strict=True)):
-        bright = sum(images[1:], images[0])
-        first = 2 + 2 * index
-        stack[first] = photometry.capture(bright + ambient, (*seed, first), gain)
-        dark = white - bright + ambient
-        stack[first + 1] = photometry.capture(dark, (*seed, first + 1), gain)
+    for number, images in enumerate(zip(*streams, strict=True), start=2):
+        bright = sum(images, ambient)
+        stack[number] = photometry.capture(bright, (*seed, number), gain)
     return Frames(stack, canvas.corner)
 
 
@@ -110,18 +115,41 @@ def _images(
     canvas: ImageCanvas,
     shown: Shown,
     light: RenderedLight,
-    n_bits: int,
+    read: RingsForCamera,
     photometry: Photometry,
 ) -> Iterator[Grey]:
-    """Images of a projector's white, so many bits and disc; what it lacks is dark."""
-    patterns = shown.patterns
-    yield canvas.image(light.white, light.samples, photometry)
-    for bit in range(n_bits):
-        level = np.zeros_like(light.white)
-        if bit < patterns.n_bits:
-            level = _level(patterns.bit(bit), light)
-        yield canvas.image(light.white * level, light.samples, photometry)
-    yield canvas.image(light.white * light.root, light.samples, photometry)
+    """Images of a projector's white, and of the frames and inverses that are read.
+
+    Bits that it hasn't are dark.
+    """
+    at = light.samples, photometry
+    patterns, codes = shown.patterns, shown.design.response
+    frames = [one for one in patterns.frames([_CAMERA]) if one.kind != "black"]
+    if codes.is_linear and shown.projector.response.is_linear:
+        # Frame and inverse make up white: half of the work is enough.
+        frames = [one for one in frames if not one.inverse]
+    panel = PanelLight(light.pixels, light.spread)
+    window = panel.window
+    drawn = PanelCanvas.of(shown.design, patterns, {_CAMERA: patterns}, window)
+    levels = [frame_levels(drawn, patterns, frame, codes).ravel() for frame in frames]
+    emitted = shown.projector.response.light.astype(np.float32)
+    shares = panel.gathered(emitted[np.stack(levels, axis=1)], window)
+    places = map(_place, frames)
+    shown_as = dict(zip(places, shares.T, strict=True))
+    white = canvas.image(light.white * shown_as["white", None, False], *at)
+    yield white
+    image = white
+    for frame in read.frames([_CAMERA])[2:]:
+        share = shown_as.get(_place(frame))
+        if share is not None:
+            image = canvas.image(light.white * share, *at)
+        else:
+            image = white - image if frame.inverse else np.zeros_like(white)
+        yield image
+
+
+def _place(frame: Frame) -> tuple[str, int | None, bool]:
+    return frame.kind, frame.bit, frame.inverse
 
 
 def render_lines(
@@ -137,22 +165,17 @@ def render_lines(
     image = canvas.image(around, everything, photometry)
     for one in shown:
         light = one.light(seen, photometry.projector_blur_m)
-        bright = (np.arange(one.patterns.n_annuli) % 2).astype(np.float32)
-        level = light.white * _level(bright, light)
+        panel, patterns = PanelLight(light.pixels, light.spread), one.patterns
+        drawn = PanelCanvas.of(one.design, patterns, {}, panel.window)
+        odd = (np.arange(patterns.n_annuli) % 2).astype(np.float32)
+        levels = one.design.response.levels(drawn.shares(odd))
+        emitted = one.projector.response.light.astype(np.float32)[levels.reshape(-1, 1)]
+        level = light.white * panel.gathered(emitted, drawn.window)[:, 0]
         image += canvas.image(level, light.samples, photometry)
     # Lines may cover little of the image; the brightest are exposed for all the same.
     brightest = float(np.percentile(image[image > 0.0], 99.0)) if image.any() else 1.0
     captured = photometry.capture(image, seed, photometry.gain(brightest))
     return Frames(captured[None], canvas.corner)
-
-
-def _level(bright: Grey, light: RenderedLight) -> Grey:
-    """Blurred brightness at each lit sample, by that of the annuli."""
-    inwards = np.concatenate([bright[:1], bright[:-1]]) - bright
-    outwards = np.concatenate([bright[1:], bright[-1:]]) - bright
-    k = light.annulus
-    level = bright[k] + inwards[k] * light.inner + outwards[k] * light.outer
-    return level.astype(np.float32, copy=False)
 
 
 def _binned(cells: Grey, fold: int) -> Grey:

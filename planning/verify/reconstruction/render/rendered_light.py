@@ -1,9 +1,8 @@
-"""A projector's light on what a camera sees: which annulus, how bright, how blurred."""
+"""A projector's light on what a camera sees: how bright, whence, how blurred."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import ndtr
 
 from geometry.rays.rays import CHUNK, RayCaster, equal_parts
 from planning.verify.reconstruction.arrays import Array, Columns, Grey, Indices
@@ -15,6 +14,9 @@ from .view import RenderedView
 
 # Standard deviation of the unit square that a pixel gathers light over.
 _PIXEL_SPREAD = 1.0 / np.sqrt(12.0)
+# Where a camera looks along the surface no edge is found; what a pixel gathers there is
+# cut off so wide [px of the projector].
+_MOST_GATHERED_PX = 3.0
 # Shadow rays stop this share of their length before the point they ask about.
 SHADOW_SLACK = 2e-5
 
@@ -23,18 +25,15 @@ SHADOW_SLACK = 2e-5
 class RenderedLight(Columns):
     """A projector's light on the samples of a view that it reaches, shape (n,) each.
 
-    `annulus` is where a sample lies; `inner` and `outer` the shares of blurred light
-    from the next annulus inwards and outwards; `root` the share of the root disc's
-    outside; `white` the irradiance under the white frame times the albedo; `depth` z
-    before the projector [m].
+    `white` is the irradiance under a white panel times the albedo; `pixels` where on
+    the panel the light is from, and `spread` how widely it is blurred there, (n, 2);
+    `depth` z before the projector [m].
     """
 
     samples: Indices
     white: Grey
-    annulus: Indices
-    inner: Grey
-    outer: Grey
-    root: Grey
+    pixels: Array
+    spread: Array
     depth: Array
 
 
@@ -76,31 +75,27 @@ class Shown:
         self, seen: RenderedView, samples: Indices, in_focus_m: float
     ) -> RenderedLight:
         """Light on those of some samples that it reaches, before falloff."""
-        law, patterns = self.projector.light, self.patterns
+        law = self.projector.light
         lit, cosine, pixels, depth = self._reached(seen, samples)
+        # A pixel of the camera gathers light from where it falls on the surface.
         rays, normals = seen.rays[lit], seen.normals[lit]
-        plane = self.design.ring_plane(pixels)
-        rho = np.hypot(plane[:, 0], plane[:, 1])
-        outward = plane / np.maximum(rho, 1e-12)[:, None]
-        across = law.ring_normals(outward, rho) @ self.design.world_from_ring[:3, :3].T
-        slant = np.einsum("ij,ij->i", across, rays)
-        slant /= np.einsum("ij,ij->i", normals, rays)
-        stretch = 1.0 - 2.0 * slant * np.einsum("ij,ij->i", across, normals) + slant**2
-        cell = _PIXEL_SPREAD / seen.fold
-        pixel = cell * seen.distances[lit] / seen.camera.focal_px
+        slopes = law.gradients(self.projector.panel_coordinates(pixels), depth)
+        slopes = slopes @ self.projector.world_from_device[:3, :3].T
+        slant = np.einsum("ikj,ij->ik", slopes, rays)
+        slant /= np.einsum("ij,ij->i", normals, rays)[:, None]
+        slopes = slopes - slant[:, :, None] * normals[:, None]
+        cell = _PIXEL_SPREAD / seen.fold * seen.distances[lit] / seen.camera.focal_px
+        scale = np.diag(self.projector.matrix)[:2]
+        gathered = cell[:, None] * np.linalg.norm(slopes, axis=2) * scale
         square = in_focus_m**2
         if self.defocus is not None:
             square = square + self.defocus.blur_m(depth) ** 2
-        blur = np.sqrt(square + pixel**2 * np.maximum(stretch, 0.0))
-        spread = blur / law.across_m(np.ones_like(rho), rho, depth)
-        annulus, inner, outer, drawn = patterns.blurred(rho, spread)
+        blur = (np.sqrt(square) * law.shrink(depth))[:, None] * scale
         return RenderedLight(
             lit,
-            (seen.albedo[lit] * cosine * drawn).astype(np.float32),
-            annulus,
-            inner.astype(np.float32),
-            outer.astype(np.float32),
-            ndtr(patterns.root_side(plane) / spread).astype(np.float32),
+            (seen.albedo[lit] * cosine).astype(np.float32),
+            pixels,
+            np.hypot(blur, np.minimum(gathered, _MOST_GATHERED_PX)),
             depth,
         )
 

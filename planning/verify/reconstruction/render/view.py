@@ -32,7 +32,7 @@ class RenderedView:
         cells: Flat index in the window's cells of each sample, shape (n,).
         weights: Share of the cell that each sample stands for, shape (n,).
         points: Surface points in the world [m], shape (n, 3).
-        normals: Face normals there, shape (n, 3).
+        normals: Face normals there, of the side that is seen, shape (n, 3).
         rays: Viewing directions, shape (n, 3).
         distances: From the camera [m], shape (n,).
         albedo: Shape (n,).
@@ -92,6 +92,9 @@ def view(
     weights = np.ones(len(cells), dtype=np.float32)
     weights[len(whole) :] = 1.0 / len(_SUB)
     points = camera.centre + reach[:, None] * all_rays
+    normals = mesh.face_normals[all_faces]
+    behind = np.einsum("ij,ij->i", all_rays, normals) > 0.0
+    normals[behind] *= -1.0
     return RenderedView(
         camera,
         (left, top),
@@ -100,7 +103,7 @@ def view(
         cells,
         weights,
         points,
-        mesh.face_normals[all_faces],
+        normals,
         all_rays,
         reach,
         photometry.albedo(points),

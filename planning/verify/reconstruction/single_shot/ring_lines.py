@@ -61,7 +61,9 @@ def find_lines(frames: Frames, width_px: float) -> ImageEdges:
     pixels = places[inside] + np.array(frames.corner)
     ring, root = np.full(len(pixels), -1), np.zeros(len(pixels), dtype=np.int8)
     unknown = np.full(len(pixels), np.nan)
-    return ImageEdges(pixels, ring, root, across[inside], spread, unknown)
+    return ImageEdges(
+        pixels, ring, root, across[inside], spread, unknown, np.zeros(len(ring))
+    )
 
 
 def _falls(smooth: Array, places: Array, reach: Array, least: Array) -> Mask:
