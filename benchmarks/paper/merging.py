@@ -25,7 +25,7 @@ from planning.verify.reconstruction.check.accuracy import (
     nearest_distance,
 )
 from planning.verify.reconstruction.check.overlaps import pixel_sizes
-from planning.verify.reconstruction.cloud import TEXTURE_PX, Cloud
+from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.reconstruct import reconstruct
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.scanner import Scanner
@@ -162,7 +162,9 @@ def _right(cloud: Cloud, scanner: Scanner) -> Cloud:
         hit = np.where(faces >= 0, away, np.nan)[:, None]
         seen[of] = camera.centre + hit * cloud.rays[of]
     off = np.linalg.norm(cloud.points - seen, axis=1)
-    sigma = np.linalg.norm(cloud.shift, axis=1) * np.hypot(cloud.noise_px, TEXTURE_PX)
+    sigma = np.linalg.norm(cloud.shift, axis=1) * np.hypot(
+        cloud.noise_px, cloud.bias_px
+    )
     return replace(cloud, points=seen).take(off <= _SIGMAS * sigma)
 
 

@@ -25,7 +25,7 @@ def squarest_projectors(cloud: Cloud, *, gap_m: float, pitch_px: float) -> Cloud
         seen = np.flatnonzero(cloud.camera == camera)
         by_camera = cloud.take(seen)
         tiles = Tiles.of(by_camera.pixels, pitch_px)
-        normals[seen] = plane_normals(by_camera.points, by_camera.rays, tiles)
+        normals[seen] = plane_normals(by_camera.points, by_camera.rays, tiles)[0]
         square[seen] = _squarest_projector(by_camera, tiles, normals[seen])
     squarest, normals = cloud.take(square), normals[square]
     sigma = squarest.sigma(normals)

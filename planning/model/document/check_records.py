@@ -54,7 +54,13 @@ class SurfaceShare(Part):
 
 
 class ReconstructionRecord(Part):
-    """Errors, completeness and verdict."""
+    """Errors, completeness and verdict.
+
+    Attributes:
+        left_out_fraction: Share of the ring edges found in images that gave no point,
+            or a point that merging took for a step between surfaces.
+        beyond_1mm_fraction: Share of the merged points that are off by more.
+    """
 
     n_points: int
     n_merged: int
@@ -63,6 +69,8 @@ class ReconstructionRecord(Part):
     accuracy_p95_m: float | None
     accuracy_bias_m: float | None
     accuracy_max_m: float | None = None
+    left_out_fraction: float | None = None
+    beyond_1mm_fraction: float | None = None
     completeness: tuple[CompletenessRecord, ...]
     predicted_missing: float | None
     pixel_noise: float | None

@@ -35,11 +35,22 @@ def check_lines(plan: RigPlan) -> list[str]:
     lines = [
         f"{verdict}: reconstructed from rendered pixels, "
         f"{check.n_merged} points of {check.n_points}",
-        error_words(rms, p95, bias, limits),
+        error_words(rms, p95, bias, limits) + _left_out(check),
         f"of the target predicted measured: {near}; "
         f"{missing} missing ({100 * limits.max_predicted_missing:g} %)",
     ]
     return ["", *labelled("CHECK", lines + _agreement(check))]
+
+
+def _left_out(check: ReconstructionRecord) -> str:
+    """What errors are without; plans from before don't say."""
+    left_out, beyond = check.left_out_fraction, check.beyond_1mm_fraction
+    if left_out is None or beyond is None:
+        return ""
+    return (
+        f"; {percent(left_out)} of the edges found are left out, "
+        f"{percent(beyond, decimals=3)} of the points off by more than 1 mm"
+    )
 
 
 def _agreement(check: ReconstructionRecord) -> list[str]:

@@ -108,6 +108,14 @@ def test_normals_and_sigma_of_the_merged_cloud_are_those_of_the_sphere(check):
     assert np.quantile(cosine, 0.05) > np.cos(np.deg2rad(12.0))
     ratio = np.abs(check.accuracy.distances) / check.merged.sigma
     assert 0.5 < np.nanmedian(ratio) / 0.6745 < 1.6
+    # By deciles of sigma, but where an edge may lie anywhere between two rings.
+    sure = np.isfinite(ratio) & (cloud.noise_px < 0.5)
+    order = np.argsort(check.merged.sigma[sure])
+    for part in np.array_split(ratio[sure][order], 10):
+        assert 0.5 < np.sqrt(np.mean(part**2)) < 1.35
+    everything = check.to_document()
+    assert 0.0 < everything["left_out_fraction"] < 0.5
+    assert everything["beyond_1mm_fraction"] < 1e-3
 
 
 def test_merged_points_are_better_than_either_projectors(check, ball):
@@ -215,7 +223,8 @@ def test_an_object_one_per_cent_off_in_size_fails(
     assert any(f"distance is {1e3 * bias:.1f}"[:-1] in text for text in result.failures)
     assert len(result.failures) == 3
     larger = "larger" if scale > 1.0 else "smaller"
-    assert f"the object looks 1 % {larger}" in result.failures[0]
+    words = rf"the object looks (1|0\.99|1\.01) % {larger}"
+    assert re.search(words, result.failures[0])
 
 
 def test_two_equal_cameras_have_noise_of_their_own(rigs, one_light):

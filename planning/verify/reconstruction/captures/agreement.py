@@ -58,7 +58,7 @@ class Agreement:
 
     def _surface(self, cloud: Cloud) -> Surface:
         tiles = Tiles.of(cloud.pixels, ring_pitch_px(cloud, self.plan))
-        return cloud, plane_normals(cloud.points, cloud.rays, tiles)
+        return cloud, plane_normals(cloud.points, cloud.rays, tiles)[0]
 
     @cached_property
     def residuals(self) -> dict[frozenset[PairIndex], float]:

@@ -42,6 +42,10 @@ class Accuracy(Columns):
         """Mean in [m]."""
         return float(np.mean(self.distances))
 
+    def beyond(self, distance_m: float) -> float:
+        """Return the share of points farther from the mesh."""
+        return share_of(np.abs(self.distances) > distance_m)
+
     @property
     def max_m(self) -> float:
         """Largest absolute distance in [m]."""

@@ -18,7 +18,7 @@ from planning.verify.reconstruction.decode.lit_image import LitImage
 from planning.verify.reconstruction.scanner import Scanner
 
 from .calibration_sigma import calibration_sigma, camera_px
-from .lattice import lattice_px
+from .lattice import PanelEffects
 from .overlaps import compare_overlaps, pixel_sizes
 from .ring_curves import RingCurves
 from .tiles import Tiles, plane_normals
@@ -99,17 +99,19 @@ def merge(
         points=cloud.points + shift[:, None] * cloud.beams,
         noise_px=noise_px * np.where(certain, remaining, 1.0),
     )
-    normals = np.full((len(cloud), 3), np.nan)
+    normals, relief = np.full((len(cloud), 3), np.nan), np.zeros(len(cloud))
     for camera in np.unique(cloud.camera[~steps]):
         seen = np.flatnonzero((cloud.camera == camera) & ~steps)
         tiles = Tiles.of(cloud.pixels[seen], pitch_px)
-        normals[seen] = plane_normals(fitted.points[seen], cloud.rays[seen], tiles)
-    lattice = lattice_px(fitted, normals, plan)
-    bias_px = np.where(doubtful, 0.0, np.hypot(cloud.bias_px, np.nan_to_num(lattice)))
-    fitted = replace(fitted, bias_px=bias_px)
+        planes = plane_normals(fitted.points[seen], cloud.rays[seen], tiles)
+        normals[seen], relief[seen] = planes
+    panel = PanelEffects.of(fitted, normals, plan)
+    bias_px = np.where(doubtful, 0.0, np.hypot(cloud.bias_px, panel.lattice_px))
+    outwards = fitted.points - panel.inwards[:, None] * cloud.rays
+    fitted = replace(fitted, bias_px=bias_px, points=outwards)
     # In a step there is no surface whose normal would make an error less.
     largest = np.linalg.norm(fitted.shift, axis=1) * fitted.noise_px
-    sigma = np.where(doubtful, largest, fitted.sigma(normals))
+    sigma = np.where(doubtful, largest, np.hypot(fitted.sigma(normals), relief))
     calibration = calibration_sigma(fitted, normals, plan)
     total = np.hypot(sigma, calibration)
 

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from planning.model.document.check_records import (
     CompletenessRecord,
     ReconstructionRecord,
@@ -95,6 +97,13 @@ class Reconstruction:
         return share_of(self.merged.steps)
 
     @property
+    def left_out_fraction(self) -> float:
+        """Share of the edges found that gave no point, or a false one at a step."""
+        n_edges = sum(pair.n_edges for pair in self.pairs)
+        n_right = self.n_points - int(np.count_nonzero(self.merged.steps))
+        return 1.0 - n_right / n_edges if n_edges else 0.0
+
+    @property
     def merging(self) -> str:
         """What merging did, in words."""
         shared = share_of(self.merged.shared)
@@ -117,6 +126,8 @@ class Reconstruction:
             accuracy_p95_m=None if accuracy is None else accuracy.p95_m,
             accuracy_bias_m=None if accuracy is None else accuracy.bias_m,
             accuracy_max_m=None if accuracy is None else accuracy.max_m,
+            left_out_fraction=self.left_out_fraction,
+            beyond_1mm_fraction=None if accuracy is None else accuracy.beyond(1e-3),
             completeness=tuple(
                 CompletenessRecord(threshold_m=threshold, fraction=fraction)
                 for threshold, fraction in zip(

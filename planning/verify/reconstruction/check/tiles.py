@@ -18,6 +18,7 @@ class Tiles:
 
     of_point: Indices
     shape: tuple[int, int]
+    side_px: int
 
     @classmethod
     def of(cls, pixels: Array, pitch_px: float) -> "Tiles":
@@ -25,7 +26,7 @@ class Tiles:
         side = int(np.clip(np.ceil(pitch_px), _MIN_TILE_PX, _MAX_TILE_PX))
         place = np.floor((pixels - pixels.min(axis=0)) / side).astype(np.int64) + 1
         columns, rows = (place.max(axis=0) + 2).tolist()
-        return cls(place[:, 1] * columns + place[:, 0], (rows, columns))
+        return cls(place[:, 1] * columns + place[:, 0], (rows, columns), side)
 
     def sum_around(self, values: Array | None = None) -> Array:
         """Return sums over each tile and its eight neighbours, (n_tiles,)."""
@@ -37,7 +38,7 @@ class Tiles:
         return (wide[:, :-2] + wide[:, 1:-1] + wide[:, 2:]).ravel()
 
 
-def plane_normals(points: Array, rays: Array, tiles: Tiles) -> Array:
+def plane_normals(points: Array, rays: Array, tiles: Tiles) -> tuple[Array, Array]:
     """Return normals of the planes through the points around each point's tile.
 
     Args:
@@ -46,8 +47,9 @@ def plane_normals(points: Array, rays: Array, tiles: Tiles) -> Array:
         tiles: Where they lie in the image.
 
     Returns:
-        Unit normals towards the camera, shape (n, 3); NaN where points are too few, or
-        on a line.
+        Unit normals towards the camera, shape (n, 3), NaN where points are too few, or
+        on a line; and the relief of a pixel's width [m], shape (n,): points lie off the
+        plane of nine tiles by so much, and near a crease it goes with the width.
     """
     points = points - points.mean(axis=0)
     count = tiles.sum_around()
@@ -63,4 +65,5 @@ def plane_normals(points: Array, rays: Array, tiles: Tiles) -> Array:
     flat = (count >= _MIN_POINTS) & (values[:, 1] > _MIN_SPREAD * values[:, 2])
     normals = np.where(flat[:, None], vectors[:, :, 0], np.nan)[tiles.of_point]
     away = np.einsum("ij,ij->i", normals, rays) > 0.0
-    return np.where(away[:, None], -normals, normals)
+    relief = np.sqrt(np.maximum(values[:, 0], 0.0)) / (3.0 * tiles.side_px)
+    return np.where(away[:, None], -normals, normals), relief[tiles.of_point]

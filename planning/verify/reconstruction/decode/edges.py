@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import nnls
 from scipy.special import erfinv
 
 from planning.verify.reconstruction.arrays import (
@@ -32,6 +33,8 @@ _MIN_CERTAINTY = 0.18
 # Least contrast of a pixel, as a share of the largest beside it: less is the rim of an
 # object or shadow, whose mixed pixels shift edges.
 _MIN_EVENNESS = 0.6
+# Pixels that tell the noise, and grey levels among which they are told apart.
+_FEWEST_SURE, _LEVELS = 100, 8
 # Beyond this an edge is saturated, and its probit says nothing.
 _MAX_LEVEL = 0.98
 # Blur of a lens and its pixels that shifts edges where brightness changes [px].
@@ -79,9 +82,8 @@ def find_edges(
         that name a ring.
     """
     reader = _Reader(frames.stack, patterns)
-    noise = reader.grey_noise()
-    by_rows, changes = _crossings(reader, noise)
-    by_columns, more = _crossings(reader.transposed(), noise)
+    by_rows, changes = _crossings(reader)
+    by_columns, more = _crossings(reader.transposed())
     pixels, across = by_columns.pixels[:, ::-1], by_columns.across[:, ::-1]
     by_columns = replace(by_columns, pixels=pixels, across=across)
     # A crossing is kept in the one direction that runs more squarely into the edge.
@@ -93,6 +95,31 @@ def find_edges(
     return edges, lit, int(np.count_nonzero(reader.valid)), changes + more
 
 
+@dataclass(frozen=True)
+class GreyNoise:
+    """Variance of one frame's grey levels: read noise, and shot noise of light.
+
+    Attributes:
+        dark: In the dark.
+        of_light: More of it for each grey level.
+    """
+
+    dark: float
+    of_light: float
+
+    @classmethod
+    def fitted(cls, level: Array, variance: Array) -> "GreyNoise":
+        """Return the line through variances at grey levels, neither part negative."""
+        terms = np.column_stack([np.ones(len(level)), level])
+        (dark, of_light), _ = nnls(terms, variance)
+        return cls(max(float(dark), 1e-6), float(of_light))
+
+    def at(self, level: Grey) -> Array:
+        """Return the standard deviation at grey levels, any shape."""
+        light = np.maximum(level.astype(np.float64), 0.0)
+        return np.sqrt(self.dark + self.of_light * light)
+
+
 class _Reader:
     """Bits, annulus indices and normalised differences of a stack of images.
 
@@ -102,6 +129,7 @@ class _Reader:
         code: Bits of each pixel.
         index: Annulus of each pixel, -1 where there is none.
         sure: Pixels whose every bit stands out.
+        noise: Of one frame.
         even: Pixels about which the contrast is nearly the same.
     """
 
@@ -117,7 +145,8 @@ class _Reader:
             self.valid, patterns.index_of_code[self.code], np.int16(-1)
         )
         self.sure = self.valid & (least >= _MIN_CERTAINTY * self.contrast)
-        self.even = _even(contrast, self.grey_noise())
+        self.noise = self.grey_noise()
+        self.even = _even(contrast, self.noise.at(0.5 * (white + black)))
 
     def transposed(self) -> "_Reader":
         """Return the same reader with rows and columns exchanged."""
@@ -126,6 +155,7 @@ class _Reader:
         other.patterns = self.patterns
         for name in ("contrast", "valid", "code", "index", "sure", "even"):
             setattr(other, name, getattr(self, name).T)
+        other.noise = self.noise
         return other
 
     def level(self, frame: Indices | int, i: Indices, j: Indices) -> Grey:
@@ -134,16 +164,26 @@ class _Reader:
         bright = stack[frame, i, j].astype(np.float32)
         return (bright - stack[frame + 1, i, j]) / self.contrast[i, j]
 
-    def grey_noise(self) -> float:
-        """Return the standard deviation of one frame, from I + I_inv = W + K."""
+    def grey_noise(self) -> GreyNoise:
+        """Return the noise of one frame, from I + I_inv = W + K."""
         i, j = np.nonzero(self.sure)
-        if len(i) < 100:
-            return 1.0
-        i, j = i[:: max(1, len(i) // 20_000)], j[:: max(1, len(j) // 20_000)]
-        frames = self._stack[:4, i, j].astype(np.float32)
-        rest = frames[2] + frames[3] - frames[0] - frames[1]
+        if len(i) < _FEWEST_SURE:
+            return GreyNoise(1.0, 0.0)
+        step = max(1, len(i) // 20_000)
+        frames = self._stack[:4, i[::step], j[::step]].astype(np.float64)
+        rest = np.abs(frames[2] + frames[3] - frames[0] - frames[1])
+        light = 0.5 * (frames[0] + frames[1])
+        order = np.argsort(light, kind="stable")
+        parts = [order] if len(order) < 1000 else np.array_split(order, _LEVELS)
         # Mean absolute values: a median of whole grey levels would be a whole one.
-        return max(0.5 * np.sqrt(0.5 * np.pi) * float(np.mean(np.abs(rest))), 1e-3)
+        spread = [0.5 * np.sqrt(0.5 * np.pi) * rest[part].mean() for part in parts]
+        level = [light[part].mean() for part in parts]
+        return GreyNoise.fitted(np.array(level), np.square(spread))
+
+    def half_lit(self, i: Indices, j: Indices) -> Grey:
+        """Return half of white and black, the grey level of an edge."""
+        white, black = (self._stack[k, i, j].astype(np.float32) for k in (0, 1))
+        return 0.5 * (white + black)
 
 
 def read_code(stack: Images, n_bits: int) -> tuple[NDArray[np.int16], Grey]:
@@ -163,10 +203,10 @@ def read_code(stack: Images, n_bits: int) -> tuple[NDArray[np.int16], Grey]:
     return code, least
 
 
-def _even(contrast: Grey, noise: float) -> Mask:
+def _even(contrast: Grey, noise: Array) -> Mask:
     """Pixels whose 3 x 3 neighbours' contrast differs by little, noise allowed for."""
     low, high = (_about(contrast, extreme) for extreme in (np.minimum, np.maximum))
-    return low >= np.float32(_MIN_EVENNESS) * high - np.float32(4.0 * noise)
+    return low >= np.float32(_MIN_EVENNESS) * high - (4.0 * noise).astype(np.float32)
 
 
 def _about(image: Grey, extreme: np.ufunc) -> Grey:
@@ -176,7 +216,7 @@ def _about(image: Grey, extreme: np.ufunc) -> Grey:
     return extreme(extreme(padded[:, :-2], padded[:, 1:-1]), padded[:, 2:])
 
 
-def _crossings(reader: _Reader, noise: float) -> tuple[ImageEdges, Indices]:
+def _crossings(reader: _Reader) -> tuple[ImageEdges, Indices]:
     """Edges between pixels of one row, in pixels (column, row), and changes of bits."""
     index, sure = reader.index, reader.sure
     before, after = index[:, 1:-2], index[:, 2:-1]
@@ -205,6 +245,7 @@ def _crossings(reader: _Reader, noise: float) -> tuple[ImageEdges, Indices]:
     slope = np.hypot(along, cross)
     contrast = 0.5 * (reader.contrast[i, j] + reader.contrast[i, j + 1])
     uneven = _unevenness(reader.contrast, i, j, along / slope, cross / slope)
+    noise = reader.noise.at(0.5 * (reader.half_lit(i, j) + reader.half_lit(i, j + 1)))
     grey = np.sqrt(2.0) * noise / contrast * spread * np.abs(along) / slope
     edges = ImageEdges(
         np.column_stack([j + zero, i.astype(np.float64)]),
