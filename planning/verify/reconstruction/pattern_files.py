@@ -5,7 +5,7 @@ by the projector's response.
 """
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -17,7 +17,12 @@ from PIL import Image
 from geometry.files.file_content import file_content
 from planning.model.errors import CapturesError
 from planning.model.files import write_together
+from planning.verify.reconstruction.calibration import (
+    CameraCalibration,
+    ProjectorCalibration,
+)
 from planning.verify.reconstruction.patterns.panel import PanelCanvas, frame_levels
+from planning.verify.reconstruction.patterns.ring_patterns import Frame
 
 from .scanner import Scanner
 
@@ -41,6 +46,17 @@ _NOTES = {
 }
 
 
+def drawn_by(
+    projector: ProjectorCalibration, cameras: Sequence[CameraCalibration]
+) -> Callable[[Frame], NDArray[np.uint8]]:
+    """Return what gives the grey levels (h, w) of a projector's frames for cameras."""
+    seen = {camera.id: projector.pattern_for(camera) for camera in cameras}
+    canvas = PanelCanvas.of(projector, projector.pattern, seen)
+    return lambda frame: frame_levels(
+        canvas, projector.pattern, frame, projector.response
+    )
+
+
 def write_patterns(scanner: Scanner, folder: Path) -> Path:
     """Write `patterns/` into a plan's folder: PNG images and `sequence.json`.
 
@@ -53,15 +69,11 @@ def write_patterns(scanner: Scanner, folder: Path) -> Path:
     files: dict[Path, Callable[[BinaryIO], object]] = {}
     entries: list[dict[str, Any]] = []
     for p, projector in enumerate(scanner.projectors):
-        frames, pattern = scanner.frames(p), projector.pattern
-        seen = {one.id: projector.pattern_for(one) for one in scanner.cameras}
-        drawn = PanelCanvas.of(projector, pattern, seen)
+        frames, drawn = scanner.frames(p), drawn_by(projector, scanner.cameras)
         (place / projector.id).mkdir(parents=True, exist_ok=True)
         for frame in frames:
             path = place / projector.id / f"{frame.name}.png"
-            files[path] = _png_writer(
-                partial(frame_levels, drawn, pattern, frame, projector.response)
-            )
+            files[path] = _png_writer(partial(drawn, frame))
         entries.append(
             {
                 "id": projector.id,

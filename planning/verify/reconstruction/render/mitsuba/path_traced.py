@@ -15,7 +15,7 @@ from scipy.ndimage import gaussian_filter
 from planning.model.errors import InputError
 from planning.verify.reconstruction.arrays import Grey, Images
 from planning.verify.reconstruction.calibration import ProjectorCalibration
-from planning.verify.reconstruction.pattern_files import canvas
+from planning.verify.reconstruction.pattern_files import drawn_by
 from planning.verify.reconstruction.patterns.ring_patterns import Frame, Frames
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.view import object_window
@@ -107,8 +107,8 @@ class PathTracer:
         by_id = {projector.id: projector for projector in self._truth.projectors}
         if design.id not in by_id:
             return []
-        drawn = canvas(design, plan.cameras)
-        panels = {frame.name: drawn.image(frame) for frame in shown}
+        drawn = drawn_by(design, plan.cameras)
+        panels = {frame.name: drawn(frame) for frame in shown}
         white = panels[shown[0].name]
         # Frames that are rendered, and those that are what white leaves of another.
         asked, rest = [shown[0]], dict[str, Frame]()
@@ -202,7 +202,7 @@ class PathTracer:
 
     def _through_lens(self, projector: ProjectorCalibration, panel: Images) -> Grey:
         """Light of a panel's pixels, blurred as an edge in focus is at the object."""
-        level = np.asarray(panel, dtype=np.float32) / 255.0
+        level = projector.response.light.astype(np.float32)[panel.astype(np.uint8)]
         depth = float((self._truth.mesh.centre - projector.centre) @ projector.axis)
         # Pixels of the panel in a metre at the object's middle.
         dense = float(projector.matrix[0, 0])
