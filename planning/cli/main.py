@@ -10,6 +10,7 @@ from typing import NoReturn
 
 import click
 
+from planning.cli.declared.calibrate_declared import calibrate
 from planning.cli.declared.evaluate_declared import evaluate
 from planning.cli.declared.export_declared import export
 from planning.cli.declared.other_declared import (
@@ -90,6 +91,7 @@ def commands() -> None:
     plan tolerance face-plan --mount 2mm,0.2deg
                                               how well devices must be mounted
     plan lens --mesh face.obj                 which lens and focus suit an object
+    plan calibrate face-plan/plan.json        images of a board that calibrate the rig
     plan reconstruct face-plan/plan.json      a cloud from rendered or captured images
     plan export face-plan --to mitsuba        scenes for a renderer that isn't ours
 
@@ -100,7 +102,7 @@ def commands() -> None:
 
 for _command in (
     *(rig_command, evaluate, verify, accept, show, reconstruct, tolerance, export),
-    *(lens, rigs, schema, sample),
+    *(lens, calibrate, rigs, schema, sample),
 ):
     commands.add_command(_command)
 

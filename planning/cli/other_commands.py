@@ -1,6 +1,8 @@
-"""What `plan rigs`, `plan schema`, `plan sample` and `plan export` do."""
+"""What `plan rigs`, `schema`, `sample`, `export` and `calibrate` do."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -8,6 +10,7 @@ from typing import Any
 import click
 
 from geometry.mesh.mesh import TriangleMesh
+from geometry.parallel import n_threads
 from geometry.shapes.sample_head.head_shape import HeadShape
 from geometry.shapes.sample_head.sample_head import (
     DEFAULT_FACES,
@@ -17,12 +20,68 @@ from geometry.shapes.sample_head.sample_head import (
 from planning.model.files import write_atomically
 from planning.model.plan import RigPlan
 from planning.model.words import count_words
-from planning.rig.rig_files import list_presets, preset_text
+from planning.rig.rig_files import Figure, list_calibrations, list_presets, preset_text
+from planning.verify.board_images.board import board_for
+from planning.verify.board_images.board_lines import (
+    board_document,
+    board_file,
+    board_lines,
+)
+from planning.verify.board_images.chosen_images import plan_images
 from planning.verify.reconstruction.render.mitsuba.materials import Surface
 from planning.verify.reconstruction.render.mitsuba.scene_files import write_scenes
 from planning.verify.reconstruction.scanner import Scanner
 
 from .console import given, print_json, reporter, writable
+
+
+def calibrate_command(options: Mapping[str, Any]) -> int:
+    """Choose images of a board, write and print them; return 1 if they don't do."""
+    plan = RigPlan.load(options["plan_file"])
+    across, down = _pair(options["marks"], "--marks", "12x9", (2.0, 100.0))
+    if across % 1.0 or down % 1.0:
+        raise click.UsageError(f"--marks {options['marks']} must be whole numbers")
+    radius_m = plan.requirements.workspace.object_radius_m
+    board = board_for(radius_m, (int(across), int(down)))
+    if options["board"] is not None:
+        width, height = _pair(options["board"], "--board", "300x225", (1e-3, 1e5))
+        board = replace(board, size_m=(1e-3 * width, 1e-3 * height))
+    limit_m = plan.requirements.triangulation.max_sigma_m
+    if options["accuracy"] is not None:
+        limit_m = 1e-3 * options["accuracy"]
+    if limit_m is None:
+        raise click.UsageError("the plan has no largest sigma; give --accuracy MM")
+    path = options["output"] or options["plan_file"].parent / "calibration-images.json"
+    with writable(path.parent):
+        found = plan_images(
+            plan,
+            board,
+            mark_px=options["mark_px"],
+            limit_m=limit_m,
+            threads=options["threads"] or n_threads(),
+            report=reporter(quiet=options["quiet"]),
+        )
+        write_atomically(path, lambda file: file.write(board_file(plan, found)))
+    if options["as_json"]:
+        print_json(board_document(plan, found))
+    else:
+        click.echo("\n".join([*board_lines(plan, found), f"files    {path}"]))
+    return 0 if found.suffices else 1
+
+
+def _pair(
+    text: str, option: str, example: str, ends: tuple[float, float]
+) -> tuple[float, float]:
+    low, high = ends
+    try:
+        first, second = (float(part) for part in text.split("x"))
+    except ValueError:
+        first = second = math.nan
+    if not (low <= first <= high and low <= second <= high):
+        raise click.UsageError(
+            f"{option} {text} must be two numbers from {low:g} to {high:g}: {example}"
+        )
+    return first, second
 
 
 def rigs_command(name: str | None) -> int:
@@ -34,11 +93,18 @@ def rigs_command(name: str | None) -> int:
         click.echo(f"{preset.name}: {preset.description}")
         for role, device in preset.devices.items():
             click.echo(f"  {role}: {device}")
-            for figure in preset.figures:
-                if figure.device == role:
-                    click.echo(f"    {figure.key} = {figure.value}")
-                    click.echo(f"        {figure.source}")
+            _print_figures(f for f in preset.figures if f.device == role)
+    click.echo("calibrations, for `from` of [calibration] in a rig file:")
+    for calibration in list_calibrations():
+        click.echo(f"  {calibration.description}")
+        _print_figures(calibration.figures)
     return 0
+
+
+def _print_figures(figures: Iterable[Figure]) -> None:
+    for figure in figures:
+        click.echo(f"    {figure.key} = {figure.value}")
+        click.echo(f"        {figure.source}")
 
 
 def schema_command() -> int:

@@ -269,6 +269,7 @@ class Rig:
             },
             "workspace": table.workspace.to_document(),
             "limits": table.limits.model_dump(mode="json"),
+            "calibration": table.calibration.model_dump(mode="json"),
             "requirements": table.requirements.model_dump(mode="json"),
             "check": table.check.model_dump(mode="json"),
             "notes": list(self.notes()),

@@ -20,7 +20,7 @@ from planning.model.errors import RigError
 from planning.model.files import reading
 from planning.model.table_types import fault_words
 
-from .rig_tables import RigTable
+from .rig_tables import CalibrationTable, RigTable, SourcedTable
 
 _DEVICES = ("projector", "parallel_projector", "camera")
 # Ways to say one thing: a figure laid over a base replaces the base's other ways.
@@ -50,6 +50,15 @@ class Preset:
     figures: tuple[Figure, ...]
 
 
+def list_calibrations() -> tuple[Preset, ...]:
+    """Return what `from` of `[calibration]` takes, each with its figures."""
+    found: list[Preset] = []
+    for name in _names("presets", "calibrations"):
+        table = CalibrationTable.model_validate(_calibration(name))
+        found.append(Preset(name, table.description, {}, _figures("", table)))
+    return tuple(found)
+
+
 def list_presets() -> tuple[Preset, ...]:
     """Return the rigs that come with the program, by name."""
     return tuple(_preset(name) for name in preset_names())
@@ -57,9 +66,7 @@ def list_presets() -> tuple[Preset, ...]:
 
 def preset_names() -> tuple[str, ...]:
     """Return the names that `load_rig` takes without a file."""
-    folder = files("planning.rig").joinpath("presets")
-    names = (entry.name for entry in folder.iterdir())
-    return tuple(sorted(name[:-5] for name in names if name.endswith(".toml")))
+    return _names("presets")
 
 
 def read_rig(name_or_path: str | Path) -> RigTable:
@@ -83,6 +90,8 @@ def read_rig(name_or_path: str | Path) -> RigTable:
                 f"{', '.join(preset_names())}"
             )
         tables = lay_over(tomllib.loads(preset_text(base)), tables)
+    if isinstance(calibration := tables.get("calibration"), dict):
+        tables["calibration"] = _with_calibration(where, calibration)
     try:
         return RigTable.model_validate(tables)
     except ValidationError as error:
@@ -106,6 +115,8 @@ def lay_over(base: dict[str, Any], tables: dict[str, Any]) -> dict[str, Any]:
         old = base.get(key)
         if not (isinstance(value, dict) and isinstance(old, dict)):
             merged[key] = value
+        elif key == "calibration":
+            merged[key] = _lay_figures_over(old, value)
         elif key not in _DEVICES:
             merged[key] = {**old, **value}
         else:
@@ -128,6 +139,42 @@ def _lay_device_over(base: dict[str, Any], given: dict[str, Any]) -> dict[str, A
     device |= {key: given[key] for key in given if key not in ("focus", "sources")}
     device["sources"] = {**sources, **newer} if isinstance(newer, dict) else newer
     return device
+
+
+def _lay_figures_over(base: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
+    """Return a calibration laid over another: what it replaces has no source."""
+    if "from" in given:
+        return given
+    kept = {k: v for k, v in base.get("sources", {}).items() if k not in given}
+    newer = given.get("sources", {})
+    sources = {**kept, **newer} if isinstance(newer, dict) else newer
+    # One that is changed isn't what it is called any more.
+    unnamed = {"description": ""} if set(given) - {"sources"} else {}
+    return {**base, **unnamed, **given, "sources": sources}
+
+
+def _with_calibration(where: str, given: dict[str, Any]) -> dict[str, Any]:
+    """Return a calibration laid over the preset that its `from` names."""
+    given = dict(given)
+    if (name := given.pop("from", None)) is None:
+        return given
+    known = _names("presets", "calibrations")
+    if name not in known:
+        raise RigError(
+            f"{where}: [calibration] from = {name!r} must be one of {', '.join(known)}"
+        )
+    return _lay_figures_over(_calibration(name), given)
+
+
+def _calibration(name: str) -> dict[str, Any]:
+    file = files("planning.rig").joinpath("presets", "calibrations", f"{name}.toml")
+    table = tomllib.loads(file.read_text(encoding="utf-8"))
+    return {**table, "description": f"{name}: {table['description']}"}
+
+
+def _names(*folder: str) -> tuple[str, ...]:
+    names = (entry.name for entry in files("planning.rig").joinpath(*folder).iterdir())
+    return tuple(sorted(name[:-5] for name in names if name.endswith(".toml")))
 
 
 def _is_path(name: str | Path) -> bool:
@@ -169,15 +216,22 @@ def _preset(name: str) -> Preset:
     figures: list[Figure] = []
     for role in _DEVICES:
         device = getattr(table, role)
-        if device is None:
-            continue
-        devices[role] = device.name
-        for key in device.figures():
-            value: object = device
-            for part in key.split("."):
-                value = getattr(value, part)
-            figures.append(Figure(role, key, value, device.sources.get(key, "assumed")))
+        if device is not None:
+            devices[role] = device.name
+            figures += _figures(role, device)
+    if table.calibration.description:
+        devices["calibration"] = table.calibration.description
     return Preset(name, table.description, devices, tuple(figures))
+
+
+def _figures(role: str, table: SourcedTable) -> tuple[Figure, ...]:
+    figures: list[Figure] = []
+    for key in table.figures():
+        value: object = table
+        for part in key.split("."):
+            value = getattr(value, part)
+        figures.append(Figure(role, key, value, table.sources.get(key, "assumed")))
+    return tuple(figures)
 
 
 def _fault(entry: ErrorDetails) -> str:

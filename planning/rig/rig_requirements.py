@@ -49,8 +49,9 @@ def build_requirements(
             raise InputError(f"{name} = {most} must be 1 or more")
     _check_positive("tau_m", tau_m)
     _check_choice("accuracy_of", wishes.accuracy_of, ("noise", "total"))
-    triangulation = replace(
-        _limits_of(TriangulationLimits, table.limits),
+    triangulation = _limits_of(
+        TriangulationLimits,
+        table.limits,
         calibration=table.calibration.errors(),
         accuracy_of=wishes.accuracy_of,
     )
@@ -178,12 +179,14 @@ def _check_floor(workspace: Workspace) -> None:
         )
 
 
-def _limits_of(kind: type[_Limits], table: LimitsTable, device: str = "") -> _Limits:
+def _limits_of(
+    kind: type[_Limits], table: LimitsTable, device: str = "", **given: object
+) -> _Limits:
     """Return limits by their names: `x_m` is `x_mm` of the table, an angle `x_deg`."""
     written = table.model_dump()
-    values: dict[str, Any] = {}
+    values: dict[str, Any] = dict(given)
     for field in fields(kind):
-        if field.name in ("calibration", "accuracy_of"):
+        if field.name in given:
             continue
         stem = field.name.removesuffix("_m")
         keys = (field.name, f"{stem}_mm", f"{stem}_deg", f"{device}{stem}_deg")

@@ -52,17 +52,14 @@ class FocusTable(Table):
 
 
 class SourcedTable(Table):
-    """A device whose figures name their sources, perhaps with body and mount."""
+    """A table whose figures name their sources."""
 
-    name: Name
-    body: BodyTable | None = None
-    mount: MountTable | None = None
     sources: dict[str, Name] = Field(default={})
 
     def figures(self) -> tuple[str, ...]:
         """Return the dotted names of the figures that were written."""
         names: list[str] = []
-        for key in sorted(self.model_fields_set - {"name", "sources"}):
+        for key in sorted(self.model_fields_set - {"name", "description", "sources"}):
             value = getattr(self, key)
             if isinstance(value, Table):
                 names += [f"{key}.{inner}" for inner in sorted(value.model_fields_set)]
@@ -81,7 +78,15 @@ class SourcedTable(Table):
         return self
 
 
-class PinholeTable(SourcedTable):
+class DeviceTable(SourcedTable):
+    """A device, perhaps with body and mount."""
+
+    name: Name
+    body: BodyTable | None = None
+    mount: MountTable | None = None
+
+
+class PinholeTable(DeviceTable):
     """A camera or a diverging projector, `[camera]` or `[projector]`."""
 
     resolution_px: Resolution
@@ -151,7 +156,7 @@ class CameraTable(PinholeTable):
     exposure_ms: Annotated[float, Field(gt=0.0, le=1e6)] | None = None
 
 
-class ParallelTable(SourcedTable):
+class ParallelTable(DeviceTable):
     """A projector of parallel light, `[parallel_projector]`."""
 
     resolution_px: Resolution
@@ -240,9 +245,13 @@ class LimitsTable(Table):
         return self
 
 
-class CalibrationTable(Table):
-    """What a calibration leaves of each device, `[calibration]`."""
+class CalibrationTable(SourcedTable):
+    """What a calibration leaves of each device, `[calibration]`.
 
+    `from`, a preset that the rest is laid over, has been resolved.
+    """
+
+    description: str = ""
     angle_deg: Annotated[float, Field(ge=0.0, le=5.0)] = 0.0
     position_mm: Annotated[float, Field(ge=0.0)] = 0.0
     focal_percent: Annotated[float, Field(ge=0.0, le=20.0)] = 0.0

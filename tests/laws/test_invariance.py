@@ -22,6 +22,9 @@ name = "above"
 shape = "cone"
 axis = {axis}
 half_angle_deg = 65.0
+[calibration]
+angle_deg = 0.0
+position_mm = 0.0
 [requirements]
 dominant_coverage = 0.6
 coverage = 0.8

@@ -223,6 +223,7 @@ def test_a_small_workspace_does_not_pass_by_a_shrinking_denominator(tmp_path):
     path.write_text(
         'base = "default"\nname = "frontal"\n[workspace]\nshape = "cone"\n'
         "axis = [0.0, -1.0, 0.0]\nhalf_angle_deg = 10.0\n"
+        "[calibration]\nangle_deg = 0.0\nposition_mm = 0.0\n"
     )
     with pytest.raises(RequirementError, match="can be lit from anywhere") as caught:
         plan_rig(

@@ -127,7 +127,8 @@ def test_every_figure_of_every_preset_names_its_source(name):
 
 def test_presets_are_listed_with_sources():
     (default,) = [preset for preset in list_presets() if preset.name == "default"]
-    assert set(default.devices) == {"projector", "parallel_projector", "camera"}
+    roles = {"projector", "parallel_projector", "camera", "calibration"}
+    assert set(default.devices) == roles
     figures = {(f.device, f.key): f for f in default.figures}
     assert figures["camera", "focus.f_number"].value == 11.0
     assert figures["projector", "throw_ratio"].source.startswith("read: Panasonic")

@@ -1,5 +1,6 @@
 """Rigs, requirements, scenes and devices without a pose, made in one line each."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,9 +24,14 @@ def make_rig(light: str = "diverging") -> Rig:
 def make_requirements(
     mesh: TriangleMesh, rig: Rig, *, tau_m: float = TAU_M, **wishes: Any
 ) -> Requirements:
-    """What the rig asks of a mesh, whose whole surface is the target by default."""
+    """What the rig asks of a mesh, whose whole surface is the target by default.
+
+    Its calibration is left out: what one costs has tests of its own.
+    """
     asked = Wishes(**({"target": "surface"} | wishes))
-    return rig.requirements(mesh.centre, mesh.radius, asked, tau_m=tau_m)
+    required = rig.requirements(mesh.centre, mesh.radius, asked, tau_m=tau_m)
+    bare = replace(required.triangulation, calibration=None)
+    return replace(required, triangulation=bare)
 
 
 def make_scene(

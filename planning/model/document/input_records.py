@@ -146,6 +146,7 @@ class RigRecord(Part):
     rings: dict[str, Any] = Field(default={})
     workspace: dict[str, Any] = Field(default={})
     limits: dict[str, float | None] = Field(default={})
+    calibration: dict[str, Any] = Field(default={})
     requirements: dict[str, float] = Field(default={})
     check: dict[str, float] = Field(default={})
     notes: tuple[str, ...] = ()

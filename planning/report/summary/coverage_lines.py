@@ -1,5 +1,8 @@
 """What a plan lights and measures, and what one device more would, for a person."""
 
+import math
+
+from planning.model.calibration_errors import CalibrationErrors
 from planning.model.document.coverage_records import CameraMarginal, ProjectorMarginal
 from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
@@ -79,8 +82,20 @@ def _sigma_lines(plan: RigPlan) -> list[str]:
     return [
         f"predicted sigma along the normal, of {limits.noise_px:g} px edge noise "
         f"alone: {noise}{of_noise}",
-        f"with what the calibration leaves: {whole}{of_all}; rms by term {terms} mm",
+        f"with what the calibration leaves ({_left_words(limits.calibration)}): "
+        f"{whole}{of_all}; rms by term {terms} mm",
     ]
+
+
+def _left_words(errors: CalibrationErrors) -> str:
+    figures = (
+        (math.degrees(errors.angle), "deg"),
+        (1e3 * errors.position_m, "mm"),
+        (1e2 * errors.focal, "% of f"),
+        (errors.principal_px, "px"),
+    )
+    told = ", ".join(f"{value:.3g} {unit}" for value, unit in figures if value)
+    return f"{told} of each device"
 
 
 def _lost_to_mounts(plan: RigPlan) -> list[str]:

@@ -1,0 +1,1 @@
+"""Images of a board that calibrate a planned rig well enough, and what they leave."""
