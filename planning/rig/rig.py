@@ -234,7 +234,6 @@ class Rig:
         Tables whose keys end in _mm or _deg are as written in the rig file.
         """
         table = self.table
-        # No key where there are none.
         listed: dict[str, Any] = {
             key: [entry.to_document() for entry in getattr(table, key)]
             for key in ("existing", "obstacle")
