@@ -283,21 +283,29 @@ def test_sensitivities_are_those_of_errors_planted_one_by_one(plan, case):
     assert max(one.coverage for one in by_name.values()) > 0.0
     expected = first_order(case, found, _LOOSE)
     assert expected.coverage_deviation > 0.0
-    by = np.zeros((len(case.rig.devices), 7))
-    by[0, 4] = _LOOSE.angle
+    turns = {3: "tilt", 4: "pan", 5: "roll"}
+    names = [device.id for device in case.rig.devices]
+    row, column = max(
+        ((row, column) for row in range(len(names)) for column in turns),
+        key=lambda at: abs(by_name[names[at[0]], turns[at[1]]].slope),
+    )
+    by = np.zeros((len(names), 7))
+    by[row, column] = _LOOSE.angle
     own = slice(0, case.n_target)
     there, back = (
         case.outcome(case.rig.moved(sign * by)).measured[own].sum() for sign in (1, -1)
     )
     whole, steps = case.by_cameras[own].sum(), _LOOSE.angle / np.radians(0.1)
-    pan = by_name["P1", "pan"]
+    turn = by_name[names[row], turns[column]]
+    assert turn.slope
+    assert turn.bend
     before = case.planned.measured[own].sum()
-    assert pan.slope == pytest.approx((there - back) / whole / (2.0 * steps))
-    assert pan.bend == pytest.approx((there + back - 2.0 * before) / whole / steps**2)
-    alone = first_order(case, [pan], _LOOSE)
+    assert turn.slope == pytest.approx((there - back) / whole / (2.0 * steps))
+    assert turn.bend == pytest.approx((there + back - 2.0 * before) / whole / steps**2)
+    alone = first_order(case, [turn], _LOOSE)
     # The variance of a uniform deviate is a third of its bound's square.
     variance = steps**2 / 3.0
-    assert alone.coverage_deviation == pytest.approx(abs(pan.slope) * variance**0.5)
-    assert alone.coverage_shift == pytest.approx(0.5 * pan.bend * variance)
+    assert alone.coverage_deviation == pytest.approx(abs(turn.slope) * variance**0.5)
+    assert alone.coverage_shift == pytest.approx(0.5 * turn.bend * variance)
     none = first_order(case, found, AS_PLANNED)
     assert none.coverage_deviation == none.near_limits == 0.0
