@@ -57,6 +57,33 @@ class Table(BaseModel):
         return self
 
 
+class SourcedTable(Table):
+    """A table whose figures name their sources."""
+
+    sources: dict[str, Name] = Field(default={})
+
+    def figures(self) -> tuple[str, ...]:
+        """Return the dotted names of the figures that were written."""
+        names: list[str] = []
+        for key in sorted(self.model_fields_set - {"name", "description", "sources"}):
+            value = getattr(self, key)
+            if isinstance(value, Table):
+                names += [f"{key}.{inner}" for inner in sorted(value.model_fields_set)]
+            else:
+                names.append(key)
+        return tuple(names)
+
+    @model_validator(mode="after")
+    def _check_sources(self) -> Self:
+        for key in self.sources:
+            if key not in self.figures():
+                raise ValueError(
+                    f"`sources` names `{key}`, which the table doesn't give; "
+                    f"remove that source or write the figure"
+                )
+        return self
+
+
 def read_pose(rows: list[list[float]], key: str) -> Array:
     """Return a written pose with the rotation next to what was written, (4, 4).
 

@@ -18,9 +18,9 @@ from pydantic_core import ErrorDetails
 from geometry.files.file_content import file_content
 from planning.model.errors import RigError
 from planning.model.files import reading
-from planning.model.table_types import fault_words
+from planning.model.table_types import SourcedTable, fault_words
 
-from .rig_tables import CalibrationTable, RigTable, SourcedTable
+from .rig_tables import CalibrationTable, RigTable
 
 _DEVICES = ("projector", "parallel_projector", "camera")
 # Ways to say one thing: a figure laid over a base replaces the base's other ways.

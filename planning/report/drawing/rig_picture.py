@@ -17,6 +17,7 @@ from planning.model.plan import RigPlan
 from planning.model.words import count_words
 from planning.scene.placed_bodies import kind_of
 
+from .error_bar import draw_error_bar
 from .face_colours import status_colours
 from .figures import (
     ZONES,
@@ -230,6 +231,10 @@ def _draw_title(
         f"{1e4 * areas.area_m2:.0f} square cm target"
     )
     draw.text((size[0] - pad, middle), claim, INK, font=font(16.0), anchor="rm")
+    left += draw.textlength(detail, font=font(16.0)) + 3 * pad
+    right = size[0] - 4 * pad - draw.textlength(claim, font=font(16.0))
+    inset = 0.12 * size[1]
+    draw_error_bar(draw, plan.coverage.sigma, (left, inset, right, size[1] - inset))
 
 
 def _shortened(name: str) -> str:
