@@ -157,7 +157,11 @@ def test_what_can_t_be_tightened_is_told(plan, monkeypatch):
 def test_a_rig_must_state_what_is_drawn(tmp_path):
     path = tmp_path / "rig.toml"
     wishes = Wishes(max_projectors=1, robust=0.95)
-    for more, words in (("", "states neither"), ("[mounting]\nangle_deg = 0.1", "")):
+    perfect = "[calibration]\nangle_deg = 0.0\nposition_mm = 0.0\n"
+    for more, words in (
+        (perfect, "states neither"),
+        (perfect + "[mounting]\nangle_deg = 0.1", ""),
+    ):
         path.write_text(f'base = "default"\nname = "R"\n{more}\n')
         rig = load_rig(path)
         if words:
