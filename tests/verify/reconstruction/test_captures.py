@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from geometry.mesh.mesh import TriangleMesh
@@ -325,12 +326,44 @@ def test_frames_of_one_image_are_named(job):
     assert_left_out(found, "P1 with C1", "02-bit0 and 04-bit1 are the same image")
 
 
-def test_a_camera_with_gamma_is_told_to_switch_it_off(job):
-    def bent(stack):
-        return np.rint(255.0 * (stack / 255.0) ** (1 / 2.2)).astype(np.uint8)
+@pytest.mark.parametrize(
+    "curve",
+    [
+        lambda light: light ** (1 / 2.2),
+        lambda light: light**1.6,
+        lambda light: 0.3 * light + 0.7 * light * light * (3.0 - 2.0 * light),
+        lambda light: np.log1p(20.0 * light) / np.log1p(20.0),
+    ],
+)
+def test_any_rising_tone_curve_moves_no_edge(job, curve):
+    found = job.after(
+        lambda stack: np.rint(255.0 * curve(stack / 255.0)).astype(np.uint8)
+    )
+    assert_no_wrong_point(found)
+    assert found.failures == ()
+    assert any("made that good" in text for text in found.remarks)
+    good = pair_clouds(job)[0, 0]
+    own = found.everything.take(
+        (found.everything.projector == 0) & (found.everything.camera == 0)
+    )
+    apart, nearest = KDTree(good.pixels).query(own.pixels)
+    near = apart < 0.5
+    assert near.sum() > 0.9 * len(good)
+    moved = own.pixels[near] - good.pixels[nearest[near]]
+    assert np.abs(np.median(moved, axis=0)).max() < 0.002
+    assert np.median(apart[near]) < 0.02
 
-    found = job.after(bent)
-    assert_left_out(found, "P1 with C1", "in proportion to light")
+
+def test_a_curve_for_each_frame_is_refused(job):
+    """Automatic contrast: no one curve mends what another does in each frame."""
+
+    def each(stack):
+        gammas = np.where(np.arange(len(stack)) % 4 < 2, 1.0, 1 / 2.2)[:, None, None]
+        return np.rint(255.0 * (stack / 255.0) ** gammas).astype(np.uint8)
+
+    found = job.after(each)
+    assert found.pairs[0].n_points == 0
+    assert any("P1 with C1" in text for text in found.failures)
 
 
 def test_half_the_light_is_no_fault(job):

@@ -60,8 +60,25 @@ def broken_pixels(stack: Images, good: Mask, names: Sequence[str]) -> Mask:
     return broken
 
 
-def _require_linear(pairs: Grey, rests: Grey, contrast: Grey) -> None:
-    """Refuse grey levels that aren't in proportion to light, by half-bright pixels."""
+def bent(stack: Images, good: Mask) -> float:
+    """Return by how much half-bright frames and inverses exceed white, as a share.
+
+    0 where grey levels are in proportion to light, whatever surfaces pass on.
+    """
+    pixels = stack[:, good].astype(np.float32)
+    pairs = pixels[2:].reshape(-1, 2, pixels.shape[1])
+    sums = pairs.sum(axis=1)
+    by_bits = np.median(sums, axis=0) - 2.0 * pixels[1]
+    contrast = np.maximum(np.maximum(pixels[0] - pixels[1], by_bits), 1.0)
+    return _excess(pairs, sums - (pixels[0] + pixels[1]), contrast)
+
+
+def is_bent(excess: float) -> bool:
+    """Return whether an excess of half-bright frames is more than light explains."""
+    return not abs(excess) <= _MOST_BENT
+
+
+def _excess(pairs: Grey, rests: Grey, contrast: Grey) -> float:
     # If dark tones were lifted, most frames and inverses together exceed white there.
     clear = contrast >= 0.5 * float(np.median(contrast))
     level = (pairs[:, 0, clear] - pairs[:, 1, clear]) / contrast[clear]
@@ -72,12 +89,17 @@ def _require_linear(pairs: Grey, rests: Grey, contrast: Grey) -> None:
         for rest, mid in zip(share, half, strict=True)
         if min(np.count_nonzero(mid), np.count_nonzero(~mid)) >= _FEWEST_BRIGHT
     ]
-    excess = float(np.median(excesses)) if excesses else 0.0
-    if not abs(excess) <= _MOST_BENT:
+    return float(np.median(excesses)) if excesses else 0.0
+
+
+def _require_linear(pairs: Grey, rests: Grey, contrast: Grey) -> None:
+    """Refuse grey levels that no curve brings in proportion to light."""
+    excess = _excess(pairs, rests, contrast)
+    if is_bent(excess):
         raise CapturesError(
             f"where a frame and its inverse are half bright they add up to "
-            f"{1.0 + excess:.0%} of white: grey levels must be in proportion to light; "
-            f"switch gamma, tone curve and automatic contrast off"
+            f"{1.0 + excess:.0%} of white, and no one curve from grey levels to light "
+            f"mends it; switch automatic contrast and local tone mapping off"
         )
 
 

@@ -9,8 +9,9 @@ from planning.model.errors import CapturesError
 from planning.verify.reconstruction.arrays import Grey, Images, Mask
 from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
 
-from .adding_up import broken_pixels
+from .adding_up import bent, broken_pixels, is_bent
 from .edges import MIN_CONTRAST, read_code
+from .tone_curve import in_light, tone_curve
 
 _LIT_BY_BITS = 20.0
 _FEWEST_LIT = 100
@@ -57,6 +58,9 @@ def inspect(
     clipped = _clipped(window, lit, names)
     _require_different(window, lit, names)
     good = lit & ~clipped
+    curved = bent(window, good)
+    if is_bent(curved):
+        window = in_light(window, tone_curve(window, good))
     broken = broken_pixels(window, good, names)
     _require_codes(window, good & ~broken, patterns)
     reasons = (
@@ -71,6 +75,12 @@ def inspect(
         for share, why in reasons
         if share > _WORTH_A_WORD
     )
+    if is_bent(curved):
+        notes += (
+            f"grey levels weren't in proportion to light (half-bright frames and "
+            f"inverses added up to {1.0 + curved:.0%} of white); one curve for all "
+            f"frames made that good",
+        )
     frames = window.copy()
     # Without contrast nothing is decoded; what is clipped stays so for all to see.
     frames[:, broken] = 0
