@@ -143,7 +143,7 @@ def seen_from_before(scanner, mesh):
     index, ones = np.zeros(len(points), np.int16), np.ones(len(points))
     cloud = Cloud(
         *(points, rays, rays, camera.project(points)),
-        *(index, index, index, ones, rays, ones, ones),
+        *(index, index, index, ones, rays, ones, ones, ones),
     )
     along = np.einsum("ij,ij->i", rays, _outward(projector, points))
     chosen = np.abs(along) > 0.05
