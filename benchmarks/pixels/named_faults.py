@@ -1,11 +1,13 @@
-"""Which device is named: 100 draws of small faults, over edges simulated exactly.
+"""Which device is named, and what refining is worth: small faults, drawn at random.
 
 A device turned by 0.05 degrees or moved by 0.5 mm in any direction, a focal length off
-by 0.5 %, two devices swapped, an object 0.2 % larger: in turn, of any device; every
-edge with noise, one in fifty labelled wrong. Either nothing else is off, or all devices
-are by what a stated calibration leaves of them.
+by 0.5 %, two devices swapped, an object 0.2 % larger or smaller, in turn, any device.
+First over edges simulated exactly, each with noise, one in fifty labelled wrong; either
+nothing else is off, or all devices are by what a stated calibration leaves of them, of
+which rigs without a fault are drawn, too. Then through rendered pixels, the rig refined
+before the cloud is merged, against the object as it stands.
 
-    python -m benchmarks.pixels.named_faults DIR/plan.json [--draws 100]
+    python -m benchmarks.pixels.named_faults DIR/plan.json [--draws 100] [--rendered 10]
 """
 
 import argparse
@@ -16,14 +18,22 @@ import numpy as np
 from numpy.typing import NDArray
 from support.simulated_edges import simulated_edges
 
+from geometry.mesh.mesh import TriangleMesh
+from geometry.rays.proximity import closest_points
 from planning.model.calibration_errors import CalibrationErrors
 from planning.model.plan import RigPlan
+from planning.verify.audit.coverage.prediction import predict_measured
+from planning.verify.reconstruction.captures.captured import reconstruct_rendered
+from planning.verify.reconstruction.check.accuracy import Expected
+from planning.verify.reconstruction.check.deviation import best_fit
 from planning.verify.reconstruction.faults.adjustment import expected_of
 from planning.verify.reconstruction.faults.bundle import SHIFT, TURN, ZOOM, Bundle
 from planning.verify.reconstruction.faults.cause_words import in_words
 from planning.verify.reconstruction.faults.diagnosis import diagnose
+from planning.verify.reconstruction.faults.explanations import Change
 from planning.verify.reconstruction.faults.supposed import Role, Supposed
 from planning.verify.reconstruction.scanner import Scanner
+from planning.verify.verification import bare
 
 NOISE_PX, OUTLIERS, EDGES = 0.1, 0.02, 240
 TURNED, MOVED_M, LONGER, LARGER = np.deg2rad(0.05), 5e-4, 5e-3, 2e-3
@@ -46,6 +56,8 @@ def drawn(
 ) -> tuple[Fault, NDArray[np.float64]]:
     """Return a fault of a kind, of any device, and the changes that it makes."""
     rig, x = bundle.supposed, np.zeros(bundle.n_unknowns)
+    if kind == "none":
+        return Fault(kind, "objects", (0,)), x
     sizes: dict[Role, int] = {
         "cameras": len(rig.cameras),
         "projectors": len(rig.projectors),
@@ -81,30 +93,24 @@ def standing(bundle: Bundle, fault: Fault, x: NDArray[np.float64]) -> Supposed:
     return replace(stands, **{fault.role: tuple(devices)})
 
 
-def main() -> None:
+def by_edges(plan: Scanner, n_draws: int) -> None:
     """Print how often each fault is named."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("plan")
-    parser.add_argument("--draws", type=int, default=100)
-    options = parser.parse_args()
-    plan = Scanner.of(RigPlan.load(options.plan))
-    print("| the rest | fault | draws | named right | the device, not what it did |")
-    print("|---|---|---|---|---|")
+    print("| the rest | fault | draws | named first | nothing as good | said nothing |")
+    print("|---|---|---|---|---|---|")
     for rest, errors in (("as planned", None), ("as calibrated", CALIBRATED)):
         scanner = replace(plan, calibration=errors)
-        bundle = Bundle(
-            simulated_edges(Supposed.of(scanner), noise_px=NOISE_PX, most=1),
-            Supposed.of(scanner),
-        )
+        rig = Supposed.of(scanner)
+        bundle = Bundle(simulated_edges(rig, noise_px=NOISE_PX, most=1), rig)
         leaves = expected_of(bundle, errors or CalibrationErrors(), (0.0, 0.0, 0.0))
-        draws, right, device = Counter(), Counter(), Counter()
-        wrong: list[str] = []
-        for k in range(options.draws):
+        draws, first, alone, silent = Counter(), Counter(), Counter(), Counter()
+        remarks: list[str] = []
+        kinds = [KINDS[k % len(KINDS)] for k in range(n_draws)]
+        for k, kind in enumerate([*kinds, *["none"] * (n_draws // 5)]):
             rng = np.random.default_rng(k)
-            fault, x = drawn(KINDS[k % len(KINDS)], bundle, rng)
+            fault, x = drawn(kind, bundle, rng)
             x = x + leaves * rng.normal(size=len(x))
             edges = simulated_edges(
-                bundle.supposed,
+                rig,
                 standing(bundle, fault, x),
                 noise_px=NOISE_PX,
                 outliers=OUTLIERS,
@@ -112,27 +118,87 @@ def main() -> None:
                 seed=k,
             )
             causes = diagnose(scanner, edges).causes
-            draws[fault.kind] += 1
-            first = causes[0][0].change if causes else None
-            same = first is not None and (first.role, first.devices) == (
-                fault.role,
-                fault.devices,
-            )
-            moves = {"object": ("zoom",)}.get(fault.kind, (fault.kind,))
-            if same and len(causes) == len(causes[0]) == 1 and first.moves == moves:
-                right[fault.kind] += 1
-            else:
-                device[fault.kind] += same
+            changes = [each.change for each in causes[0]] if causes else []
+            moves = {"object": ("zoom",)}.get(kind, (kind,))
+            right = Change(fault.role, fault.devices, moves)
+            draws[kind] += 1
+            silent[kind] += not causes
+            first[kind] += changes[:1] == [right] and len(causes) == 1
+            alone[kind] += changes == [right] and len(causes) == 1
+            if changes != [right] and (causes or kind != "none"):
                 said = "; ".join(in_words(cause, scanner) for cause in causes)
-                wrong.append(f"draw {k}, {fault}: {said or 'nothing'}")
-        for kind in KINDS:
-            print(
-                f"| {rest} | {kind} | {draws[kind]} | {right[kind]} | {device[kind]} |"
+                remarks.append(f"{rest}, draw {k}, {fault}: {said or 'nothing'}")
+        counts = (draws, first, alone, silent)
+        for kind in (*KINDS, "none"):
+            row = " | ".join(str(each[kind]) for each in counts)
+            print(f"| {rest} | {kind} | {row} |")
+        row = " | ".join(str(each.total() - each["none"]) for each in counts)
+        print(f"| {rest} | all faults | {row} |")
+        print("\n".join(f"<!-- {line} -->" for line in remarks), flush=True)
+
+
+def by_pixels(plan: Scanner, path: str, n_draws: int) -> None:
+    """Print errors of refined clouds against the object as it stands."""
+    predicted = predict_measured(RigPlan.load(path), seed=0, threads=2)
+    expected = Expected(bare(predicted.samples), predicted.measured, predicted.by_pair)
+    rig = Supposed.of(plan)
+    bundle = Bundle(simulated_edges(rig, noise_px=NOISE_PX, most=1), rig)
+    print("\n| fault | mended | points | rms [mm] | best fit [mm] | what is said |")
+    print("|---|---|---|---|---|---|")
+    for k in range(-1, n_draws):
+        kind = "none" if k < 0 else KINDS[k % len(KINDS)]
+        fault, x = drawn(kind, bundle, np.random.default_rng(k + 1000))
+        truth = as_scanner(plan, standing(bundle, fault, x))
+        for mend in (False, True):
+            found = reconstruct_rendered(
+                plan, expected, seed=max(k, 0), truth=truth, mend=mend
             )
-        print(
-            f"| {rest} | all | {draws.total()} | {right.total()} | {device.total()} |"
-        )
-        print("\n".join(f"<!-- {line} -->" for line in wrong), flush=True)
+            cloud = found.merged.cloud.points
+            pose = best_fit(truth.mesh, cloud, plan.limits.check.max_rms_m)
+            fitted = cloud @ pose[:3, :3].T + pose[:3, 3]
+            rms = [
+                1e3 * np.sqrt(np.mean(closest_points(truth.mesh, one).distances ** 2))
+                for one in (cloud, fitted)
+            ]
+            said = "" if found.refined is None else "; ".join(found.refined.named)
+            what = f"{kind} of {fault.role} {fault.devices}" if k >= 0 else "none"
+            print(
+                f"| {what} | {'yes' if mend else 'no'} | {found.n_merged} | "
+                f"{rms[0]:.4f} | {rms[1]:.4f} | {said} |",
+                flush=True,
+            )
+
+
+def as_scanner(plan: Scanner, stands: Supposed) -> Scanner:
+    """Return what stands there; devices keep the names of their places."""
+    (body,) = stands.objects
+    turn, mesh = body.world_from_device[:3, :3], plan.mesh
+    moved = body.centre + body.scale * (mesh.vertices - mesh.centre) @ turn.T
+    return replace(
+        plan,
+        cameras=tuple(
+            replace(now, id=one.id)
+            for one, now in zip(plan.cameras, stands.cameras, strict=True)
+        ),
+        projectors=tuple(
+            replace(now, id=one.id)
+            for one, now in zip(plan.projectors, stands.projectors, strict=True)
+        ),
+        mesh=TriangleMesh(moved, mesh.faces),
+    )
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("plan")
+    parser.add_argument("--draws", type=int, default=100)
+    parser.add_argument("--rendered", type=int, default=10)
+    options = parser.parse_args()
+    plan = Scanner.of(RigPlan.load(options.plan))
+    if options.draws:
+        by_edges(plan, options.draws)
+    by_pixels(plan, options.plan, options.rendered)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ Exit: 0 reconstructed within the limits of the check, 1 a limit is missed or the
 is smaller than asked, 2 unwritable, 3 a bad plan, calibration or folder of captures.
 """
 
+import json
 from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import replace
@@ -14,6 +15,7 @@ import click
 
 from geometry.parallel import n_threads
 from planning.model.errors import CapturesError
+from planning.model.files import write_atomically
 from planning.model.plan import RigPlan
 from planning.model.progress import Report
 from planning.model.words import count_words, error_words
@@ -51,7 +53,7 @@ from planning.verify.verification import bare
 from .console import print_json, reporter, writable
 from .lines.deviation_table import deviation_lines
 
-CLOUD, DEVIATION = "cloud.ply", "deviation.ply"
+CLOUD, DEVIATION, REFINED = "cloud.ply", "deviation.ply", "refined.json"
 # How near the object is taken to lie to the mesh that labels single images.
 _PRIOR_MM = 1.0
 
@@ -88,11 +90,19 @@ def reconstruct_command(options: Mapping[str, Any]) -> int:
                 result.merged, deviation, unit, plan.digest
             )
             written[DEVIATION].save(folder / DEVIATION)
+        if result.refined is not None:
+            rig = json.dumps(result.refined.calibration_file(), indent=1).encode()
+            write_atomically(folder / REFINED, lambda file: file.write(rig))
     files = {folder / name: file for name, file in written.items()}
     if options["as_json"]:
         print_json(_document(result, deviation, files) | _sequences(twice))
     else:
         lines = [] if twice is None else _sequence_lines(plan, twice)
+        if result.refined is not None:
+            lines += [
+                *result.refined.lines(),
+                f"          written to {folder / REFINED}, as --calibration reads it",
+            ]
         click.echo("\n".join([*lines, _summary(plan, result, deviation, files)]))
     return 0 if result.passed else 1
 
@@ -140,7 +150,12 @@ def _reconstruct(
     if options["captures"] is not None:
         folder = CaptureFolder(options["captures"], scanner)
         result = reconstruct_captured(
-            folder, expected, believed=mounted, threads=threads, progress=progress
+            folder,
+            expected,
+            believed=mounted,
+            mend=options["refine"],
+            threads=threads,
+            progress=progress,
         )
         return result, None
     if options["second_sequence"]:
@@ -154,13 +169,14 @@ def _reconstruct(
             progress=progress,
         )
         return twice.both, twice
-    place = options["save_captures"]
+    place, truth = options["save_captures"], options["truth"]
     result = reconstruct_rendered(
         scanner,
         expected,
         seed=seed,
         threads=threads,
-        truth=mounted,
+        truth=mounted if truth is None else Scanner.of(RigPlan.load(truth)),
+        mend=options["refine"],
         believed=mounted,
         photometry=light,
         save=None if place is None else CaptureFolder(place, scanner),
@@ -214,6 +230,8 @@ def _document(
     }
     if deviation is not None:
         document["deviation"] = deviation.to_document()
+    if result.refined is not None:
+        document["refined"] = result.refined.to_document()
     return document
 
 

@@ -314,3 +314,31 @@ def test_errors_are_one_line_with_the_documented_code(
     found, out, err = run("plan.json", "--quiet", *words)
     assert (found, out) == (code, "")
     assert message in " ".join(err.split())
+
+
+def test_a_rig_is_refined_said_and_written_as_a_calibration(rigs, folder, simulated):
+    """C2 stands 0.6 mm beside its place; one projector lights all."""
+    plan = RigPlan.load(folder / "plan.json")
+
+    def beside(document):
+        document["cameras"][1]["world_from_device"][0][3] += 6e-4
+
+    (folder / "off").mkdir()
+    rigs.changed(plan, beside).save(folder / "off" / "plan.json")
+    truth = ["--truth", folder / "off" / "plan.json", "--quiet", "--json"]
+    found = {}
+    for name, words in (
+        ("blind", []),
+        ("refined", ["--refine"]),
+        ("again", ["--calibration", folder / "refined" / "refined.json"]),
+    ):
+        place = ["-o", folder / name]
+        _, out, _ = run(folder / "plan.json", *truth, *words, *place)
+        found[name] = json.loads(out)
+    refined = found["refined"]["refined"]
+    assert refined["moved"][0]["id"] == "C2"
+    assert refined["named"][0].startswith("C2 looks as if")
+    assert refined["after_px"] < 0.5 * refined["before_px"]
+    rms = {name: each["accuracy_rms_m"] for name, each in found.items()}
+    assert rms["refined"] < 0.5 * rms["blind"]
+    assert rms["again"] == pytest.approx(rms["refined"], rel=0.05)

@@ -97,6 +97,18 @@ from planning.cli.console import (
     help="Poses and optics as measured after mounting [default: the plan's].",
 )
 @click.option(
+    "--refine",
+    is_flag=True,
+    help="Adjust all poses and focal lengths over the edges of all pairs before clouds "
+    "are merged, from what [calibration] or mounting leaves; write refined.json.",
+)
+@click.option(
+    "--truth",
+    type=PlanFile(),
+    metavar="DIR[/plan.json]",
+    help="Simulate with what really stands there: another plan, devices matched by id.",
+)
+@click.option(
     "--align",
     type=click.Choice(["none", "best-fit"]),
     help="Of deviation.ply, which says where captured points deviate from the mesh: as "
@@ -148,6 +160,8 @@ def _check_reconstruct(options: dict[str, Any]) -> None:
         "calibration",
         "align",
         "deviation_limits",
+        "refine",
+        "truth",
     )
     experiment_only = ("light", "variant", "distortion")
     for name in plan_only if experiment else experiment_only:
@@ -161,10 +175,12 @@ def _check_reconstruct(options: dict[str, Any]) -> None:
     for first, others, why in (
         (
             "single_shot",
-            (*folders, "calibration", "second_sequence"),
+            (*folders, "calibration", "second_sequence", "refine", "truth"),
             "it is of coded sequences",
         ),
         ("second_sequence", folders, "a folder holds one sequence"),
+        ("second_sequence", ("refine", "truth"), "each has rings of its own"),
+        ("truth", ("captures",), "images that were taken show it"),
         ("ambient", folders[:1], "images that were taken have their own"),
     ):
         for name in others:

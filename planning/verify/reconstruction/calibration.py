@@ -136,12 +136,15 @@ class ProjectorCalibration(DeviceCalibration):
         beam_radius: Radius of a parallel beam about the device's axis [m]; None: none.
         pattern: What it draws.
         response: Light of its grey levels.
+        drawn_for: The matrix that its images were drawn for; None: its own. With other
+            optics than that a ring isn't a circle any more, but still a conic.
     """
 
     world_from_ring: Array
     beam_radius: float | None
     pattern: DrawnRings
     response: Response = field(default=Response(), kw_only=True)
+    drawn_for: Array | None = field(default=None, kw_only=True)
 
     @property
     def light(self) -> LightLaw:
@@ -174,8 +177,41 @@ class ProjectorCalibration(DeviceCalibration):
         pose[:3, 3] = turn @ (self.centre - self.world_from_ring[:3, 3])
         return pose
 
+    @property
+    def drawn_matrix(self) -> Array:
+        """From panel coordinates to pixels, as its images were drawn, shape (3, 3)."""
+        return self.matrix if self.drawn_for is None else self.drawn_for
+
+    @property
+    def ring_axes(self) -> Array:
+        """What directions in the world become in the ring frame, d @ axes, (3, 3).
+
+        Not quite a rotation, nor that frame a rigid one, if drawn for other optics.
+        """
+        turn = self.world_from_ring[:3, :3]
+        if self.drawn_for is None:
+            return turn
+        bent = self._bent()[:3, :3].T
+        device = self.world_from_device[:3, :3]
+        return device @ bent @ device.T @ turn
+
+    def _bent(self) -> Array:
+        """From where light is to where it would be with the optics drawn for, (4, 4).
+
+        In the device's frame; its pixel stays.
+        """
+        drawn = np.diag(self.drawn_matrix)[:2]
+        offset = (self.matrix[:2, 2] - self.drawn_matrix[:2, 2]) / drawn
+        bent = np.diag([*np.diag(self.matrix)[:2] / drawn, 1.0, 1.0])
+        bent[:2, self.light.offset_column] = offset
+        return bent
+
     def to_ring(self, points: Array) -> Array:
         """Return world points (n, 3) in the ring frame."""
+        if self.drawn_for is not None:
+            bent = self._bent()
+            local = self._local(points) @ bent[:3, :3].T + bent[:3, 3]
+            points = local @ self.world_from_device[:3, :3].T + self.centre
         return (points - self.world_from_ring[:3, 3]) @ self.world_from_ring[:3, :3]
 
     def ring_coordinate(self, points: Array) -> Array:
@@ -188,7 +224,9 @@ class ProjectorCalibration(DeviceCalibration):
 
         (x/z, y/z) in diverging light, (x, y) in [m] in parallel light.
         """
-        return self.light.turned(self.panel_coordinates(pixels), self.ring_from_device)
+        drawn = self.drawn_matrix
+        flat = (pixels - drawn[:2, 2]) / np.diag(drawn)[:2]
+        return self.light.turned(flat, self.ring_from_device)
 
     def panel(self, points: Array) -> tuple[Array, Array]:
         """Return pixels (n, 2) that light world points (n, 3), and depths z (n,).

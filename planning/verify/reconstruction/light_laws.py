@@ -20,9 +20,11 @@ class LightLaw:
 
     Attributes:
         name: As in a plan.
+        offset_column: Of a transform (4, 4) that adds to p: the translation's, or z's.
     """
 
     name: LightName = "parallel"
+    offset_column = 3
 
     def shrink(self, depth: Array) -> Array:
         """Return p in units of (x, y) at depths z [m], shape (n,): 1, or 1 / z."""
@@ -114,6 +116,7 @@ class _Diverging(LightLaw):
     """Rays from the optical centre; rings are cones."""
 
     name: LightName = "diverging"
+    offset_column = 2
 
     def shrink(self, depth: Array) -> Array:
         return 1.0 / depth

@@ -118,6 +118,9 @@ class Scanner:
         obstacles: What stands about the object and isn't a device.
         digest: Of the plan; empty where there is none.
         calibration: What its calibration leaves of each device; None: nobody says.
+        covariance: What an adjustment leaves of all devices instead, (9 n, 9 n): of
+            each camera, then of each projector, its turn about and displacement along
+            its axes [rad], [m], its focal length as a share, its principal point [px].
     """
 
     projectors: tuple[ProjectorCalibration, ...]
@@ -133,6 +136,7 @@ class Scanner:
     obstacles: tuple[Obstacle, ...] = ()
     digest: str = ""
     calibration: CalibrationErrors | None = None
+    covariance: Array | None = None
 
     @classmethod
     def of(cls, plan: RigPlan) -> Self:

@@ -1,7 +1,7 @@
 """The whole check: a sound plan passes, a rig that differs fails with a cause."""
 
 import re
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -17,8 +17,10 @@ from planning.model.plan import RigPlan
 from planning.verify.reconstruction.check.accuracy import (
     measure_accuracy,
     nearest_distance,
+    shown_inside,
 )
 from planning.verify.reconstruction.check.result import Reconstruction
+from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.patterns.ring_patterns import Frames
 from planning.verify.reconstruction.render import rendered as rendered_module
 
@@ -379,3 +381,29 @@ def test_bodies_of_others_stop_light_and_views(rigs, owner, before, dark):
     points = {pair.camera: pair.n_points for pair in found.pairs}
     assert {name for name, n in points.items() if n == 0} == dark
     assert all(n > 200 for name, n in points.items() if name not in dark)
+
+
+def test_a_pixel_that_shows_the_inside_of_an_open_mesh_is_told_by_itself(ball):
+    """A bowl open towards one camera, and points put anywhere on the rays."""
+    cut = ball.face_centroids[:, 1] > 0.2 * ball.radius
+    bowl = TriangleMesh(ball.vertices, ball.faces[cut])
+    before, behind = np.array([0.0, -1.0, 0.0]), np.array([0.0, 1.0, 0.0])
+    aims = bowl.face_centroids[::50]
+    clouds = []
+    for camera, centre in enumerate((before, behind)):
+        rays = aims - centre
+        rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+        clouds.append(cloud_of(centre + 0.7 * rays, rays, camera))
+    inside = shown_inside(Cloud.join(clouds), (before, behind), bowl)
+    assert inside[: len(aims)].mean() > 0.95
+    assert not inside[len(aims) :].any()
+
+
+def cloud_of(points: np.ndarray, rays: np.ndarray, camera: int) -> Cloud:
+    n = len(points)
+    columns = {
+        f.name: np.zeros((n, *getattr(Cloud.empty(), f.name).shape[1:]))
+        for f in fields(Cloud)
+    }
+    columns |= {"points": points, "rays": rays, "camera": np.full(n, camera)}
+    return Cloud(**columns)

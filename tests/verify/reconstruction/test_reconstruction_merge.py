@@ -11,6 +11,7 @@ from geometry.mesh.mesh import TriangleMesh
 from planning.model.calibration_errors import CalibrationErrors
 from planning.verify.reconstruction.check.calibration_sigma import (
     _SHARE,
+    _deviations,
     _off,
     camera_px,
 )
@@ -249,7 +250,7 @@ def test_an_edge_is_as_unsure_as_its_camera(flat):
     camera = plan.cameras[int(cloud.camera[0])]
     known = camera.project(cloud.points)
     square = np.zeros(len(cloud))
-    for off in _off(camera, errors):
+    for off in _off(camera, _SHARE * _deviations(errors)):
         # Of both directions in the image the mean, and errors a share of theirs.
         square += np.square(off.project(cloud.points) - known).sum(axis=1) / 2.0
     cloud = replace(cloud, pixels=known)

@@ -1,5 +1,7 @@
 """Ray meets ring surface: exact points from exact labels, for any pose."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -83,6 +85,41 @@ def test_points_come_back_exactly_with_no_wrong_root(light):
         np.testing.assert_allclose(hits.conditioning[good], true[good], atol=1e-9)
         tried += int(good.sum())
     assert tried > 60_000
+
+
+@pytest.mark.parametrize("light", ["diverging", "parallel"])
+def test_points_come_back_through_optics_that_the_rings_were_not_drawn_for(light):
+    """Rings about an axis aside of the device's; a focal length and centre off."""
+    rng = np.random.default_rng(3)
+    drawn, points, _, eye, _ = scene(rng, light, 2000)
+    ring = drawn.world_from_ring.copy()
+    ring[:3, :3] = ring[:3, :3] @ rotation_about_x(8.0)
+    if light == "diverging":
+        drawn = replace(drawn, world_from_ring=ring)
+    matrix = np.array([[1.02, 0.0, 0.004], [0.0, 1.01, -0.003], [0.0, 0.0, 1.0]])
+    projector = replace(drawn, matrix=matrix, drawn_for=drawn.matrix)
+    pixels, _ = projector.panel(points)
+    radii = np.hypot(*projector.ring_plane(pixels).T)
+    np.testing.assert_allclose(projector.ring_coordinate(points), radii, rtol=1e-12)
+    rays = points - eye
+    reach = np.linalg.norm(rays, axis=1)
+    rays /= reach[:, None]
+    steps = [projector.ring_coordinate(points + s * 1e-7 * rays) for s in (-1, 1)]
+    roots = np.sign(steps[1] - steps[0]).astype(np.int8)
+    hits = intersect_rings(eye, rays, radii, roots, projector)
+    good = np.abs(hits.conditioning) >= 0.1
+    assert good.sum() > 500
+    assert np.abs(hits.points - points)[good].max() < 1e-8
+    np.testing.assert_allclose(np.linalg.norm(hits.normals[good], axis=1), 1.0)
+    side = np.cross(hits.normals[good], rng.normal(size=3))
+    along = 1e-6 * side / np.linalg.norm(side, axis=1, keepdims=True)
+    near = projector.ring_coordinate(points[good] + along) - radii[good]
+    assert np.abs(near).max() < 1e-10
+
+
+def rotation_about_x(degrees: float) -> np.ndarray:
+    c, s = np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))
+    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
 
 
 @pytest.mark.parametrize("light", ["diverging", "parallel"])

@@ -38,8 +38,8 @@ _Lens = Annotated[list[float], Field(min_length=5, max_length=5)]
 # another device is meant: share of the distance to the object's centre, and radians.
 _FARTHEST = 0.3
 _MOST_TURNED = np.deg2rad(30.0)
-# Of a projector's optics, beyond which its rings aren't circles any more [px].
-_SAME_PX = 0.01
+# Focal lengths of a projector may differ so much from those that its images are for.
+_MOST_ZOOMED = 0.1
 
 
 class _Device(Table):
@@ -114,7 +114,10 @@ def _mounted(
         _require_drawn(device, planned)
         # The rings move with their projector.
         ring = np.linalg.inv(planned.world_from_device) @ planned.world_from_ring
-        return replace(planned, world_from_device=pose, world_from_ring=pose @ ring)
+        mounted = replace(planned, world_from_device=pose, world_from_ring=pose @ ring)
+        if device.K is None:
+            return mounted
+        return replace(mounted, matrix=np.array(device.K), drawn_for=planned.matrix)
     assert isinstance(planned, CameraCalibration)
     return replace(
         planned,
@@ -125,14 +128,19 @@ def _mounted(
 
 
 def _require_drawn(device: _Device, planned: ProjectorCalibration) -> None:
-    """Refuse optics of a projector that its patterns aren't drawn for."""
-    drawn = planned.matrix.tolist() if planned.light.name == "diverging" else None
-    if device.K is not None and (
-        drawn is None or not np.allclose(device.K, drawn, rtol=0.0, atol=_SAME_PX)
+    """Refuse optics of a projector whose rings the decoder wouldn't know."""
+    if device.K is not None and planned.light.name != "diverging":
+        raise ValueError(
+            f"K = {device.K} of a projector of parallel light; leave it out: its "
+            f"pixels are {1e3 / planned.matrix[0, 0]:g} mm apart"
+        )
+    if device.K is not None and not np.allclose(
+        np.diag(device.K)[:2], np.diag(planned.matrix)[:2], rtol=_MOST_ZOOMED
     ):
         raise ValueError(
-            f"K = {device.K} isn't the one that its patterns are drawn for ({drawn}); "
-            f"put the measured optics into the rig file, plan, and project those"
+            f"K = {device.K} isn't near the one that its patterns are drawn for "
+            f"({planned.matrix.tolist()}), within {_MOST_ZOOMED:.0%}; put the measured "
+            f"optics into the rig file, plan, and project those"
         )
     if device.distortion is not None and any(device.distortion):
         raise ValueError(

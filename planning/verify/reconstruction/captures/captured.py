@@ -21,6 +21,7 @@ from planning.verify.reconstruction.decode.decode import (
 )
 from planning.verify.reconstruction.decode.inspection import DarkError, inspect
 from planning.verify.reconstruction.faults.measured_clouds import rejection
+from planning.verify.reconstruction.faults.refine import refine, remeasured
 from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
 from planning.verify.reconstruction.reconstruct import conclude
 from planning.verify.reconstruction.render.photometry import Photometry, assumed_light
@@ -49,6 +50,7 @@ def reconstruct_rendered(
     believed: Scanner | None = None,
     photometry: Photometry | None = None,
     save: CaptureFolder | None = None,
+    mend: bool = False,
     progress: Progress | None = None,
 ) -> Reconstruction:
     """Reconstruct from rendered images.
@@ -62,6 +64,7 @@ def reconstruct_rendered(
         believed: What the decoder knows of poses and optics; the plan by default.
         photometry: Simulated light and sensor; None: as the plan's check assumes.
         save: Where the images are written; None: nowhere.
+        mend: Whether the rig is refined over the edges first.
         progress: Called with the pairs done and their total.
 
     Raises:
@@ -87,7 +90,8 @@ def reconstruct_rendered(
         believed=believed,
         develop=develop,
     )
-    return _concluded(believed or plan, pairs, inspection, expected, spent, light)
+    found = _concluded(plan, believed, pairs, inspection, expected, spent, mend)
+    return replace(found, photometry=light)
 
 
 def reconstruct_captured(
@@ -95,6 +99,7 @@ def reconstruct_captured(
     expected: Expected,
     *,
     believed: Scanner | None = None,
+    mend: bool = False,
     threads: int = 2,
     progress: Progress | None = None,
 ) -> Reconstruction:
@@ -107,6 +112,7 @@ def reconstruct_captured(
         folder: The images, and the plan for which the patterns were drawn.
         expected: By the plan.
         believed: What was measured of poses and optics; the plan by default.
+        mend: Whether the rig is refined over the edges first.
         threads: Worker threads; the result doesn't depend on them.
         progress: Called with the pairs done and their total.
 
@@ -128,7 +134,7 @@ def reconstruct_captured(
 
     pairs = over_pairs(plan, measure, threads=threads, progress=progress)
     inspection.require_some()
-    return _concluded(believed or plan, pairs, inspection, expected, spent)
+    return _concluded(plan, believed, pairs, inspection, expected, spent, mend)
 
 
 class _Inspection:
@@ -212,23 +218,28 @@ class _Inspection:
 
 def _concluded(
     plan: Scanner,
+    believed: Scanner | None,
     pairs: Pairs,
     inspection: _Inspection,
     expected: Expected,
     spent: Spent,
-    photometry: Photometry | None = None,
+    mend: bool,
 ) -> Reconstruction:
-    """Leave out what others contradict, merge, judge, and say what is missing."""
-    confirmed = confirm(pairs, plan)
-    result = conclude(
-        plan,
-        confirmed.pairs,
-        seed=0,
-        expected=expected,
-        photometry=photometry,
-        spent=spent,
-    )
+    """Leave out what others contradict, merge, judge, and say what is missing.
+
+    The rig is mended first, if asked, and the edges are measured with it again.
+    """
+    rig = believed or plan
+    refined = refine(rig, pairs) if mend else None
+    if refined is not None:
+        rig = refined.scanner
+        pairs = remeasured(plan, rig, pairs)
+    confirmed = confirm(pairs, rig)
+    result = conclude(rig, confirmed.pairs, seed=0, expected=expected, spent=spent)
     sentences = inspection.sentences(pairs, confirmed, expected)
     return replace(
-        result, failures=sentences + result.failures, remarks=inspection.remarks()
+        result,
+        failures=sentences + result.failures,
+        remarks=inspection.remarks(),
+        refined=refined,
     )

@@ -1,5 +1,6 @@
 """Measured points against the mesh, judged by the limits that the plan states."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +9,7 @@ from scipy.spatial import KDTree
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.rays.proximity import closest_points
+from geometry.rays.rays import RayCaster
 from planning.model.requirements import CheckLimits
 from planning.verify.reconstruction.arrays import Array, Columns, Indices, Mask
 from planning.verify.reconstruction.cloud import Cloud
@@ -105,6 +107,21 @@ def measure_accuracy(cloud: Cloud, mesh: TriangleMesh) -> Accuracy:
     """Return the distances of a cloud from the full mesh."""
     nearest = closest_points(mesh, cloud.points)
     return Accuracy(nearest.distances, nearest.faces)
+
+
+def shown_inside(cloud: Cloud, cameras: Sequence[Array], mesh: TriangleMesh) -> Mask:
+    """Return which points' pixels show the inside of an open mesh, shape (n,).
+
+    Where a viewing ray first meets the mesh from behind, through an opening: told by
+    the pixel alone, wherever the point was put. Optical centres (3,) in [m].
+    """
+    inside, caster = np.zeros(len(cloud), dtype=bool), RayCaster(mesh)
+    for c, centre in enumerate(cameras):
+        rows = np.flatnonzero(cloud.camera == c)
+        faces, _ = caster.first_hits(centre, cloud.rays[rows])
+        along = np.einsum("ij,ij->i", cloud.rays[rows], mesh.face_normals[faces])
+        inside[rows] = (faces >= 0) & (along > 0.0)
+    return inside
 
 
 def nearest_distance(cloud: Cloud, samples: SurfaceSamples, reach_m: float) -> Array:

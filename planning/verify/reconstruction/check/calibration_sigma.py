@@ -32,18 +32,26 @@ _Device = TypeVar("_Device", CameraCalibration, ProjectorCalibration)
 def calibration_sigma(cloud: Cloud, normals: Array, scanner: Scanner) -> Array:
     """Return what the calibration leaves of each point, along its normal [m], (n,).
 
-    Where the normal isn't known, (n, 3) with NaN, along its viewing ray.
+    Where the normal isn't known, (n, 3) with NaN, along its viewing ray. After an
+    adjustment it is that one's covariance that counts.
     """
-    errors = scanner.calibration
     sigma = np.zeros(len(cloud))
-    if errors is None:
+    covariance = scanner.covariance
+    if covariance is None and scanner.calibration is not None:
+        n = len(scanner.cameras) + len(scanner.projectors)
+        covariance = np.diag(np.tile(_deviations(scanner.calibration), n) ** 2)
+    if covariance is None:
         return sigma
     known = np.isfinite(normals[:, :1])
     towards = np.where(known, normals, -cloud.rays)
     for (p, c), pair in scanner.pairs():
         rows = np.flatnonzero((cloud.projector == p) & (cloud.camera == c))
+        of = [9 * k + np.arange(9) for k in (c, len(scanner.cameras) + p)]
+        own = np.concatenate(of)
         if len(rows):
-            sigma[rows] = _of_pair(cloud.take(rows), towards[rows], pair, errors)
+            sigma[rows] = _of_pair(
+                cloud.take(rows), towards[rows], pair, covariance[np.ix_(own, own)]
+            )
     return sigma
 
 
@@ -68,9 +76,16 @@ def camera_px(cloud: Cloud, scanner: Scanner) -> Array:
     return moved
 
 
+def _deviations(errors: CalibrationErrors) -> Array:
+    """Standard deviations of a device's nine errors."""
+    each = (errors.about_axis, errors.along_axis_m, errors.focal, errors.along_line_px)
+    return np.repeat(each, (3, 3, 1, 2))
+
+
 def _of_pair(
-    cloud: Cloud, normals: Array, pair: PairCalibration, errors: CalibrationErrors
+    cloud: Cloud, normals: Array, pair: PairCalibration, covariance: Array
 ) -> Array:
+    """Standard deviation by the errors of camera and projector, (18, 18)."""
     points, rays = cloud.points, cloud.rays
     ring = pair.projector.ring_coordinate
     gradient = np.column_stack(
@@ -82,34 +97,29 @@ def _of_pair(
     along = np.einsum("ij,ij->i", gradient, rays)
     facing = np.einsum("ij,ij->i", normals, rays)
     reach = np.linalg.norm(points - pair.camera.centre, axis=1)[:, None]
-    variance = np.zeros(len(cloud))
-    for camera in _off(pair.camera, errors):
+    steps = _SHARE * np.sqrt(np.diag(covariance))
+    moves: list[Array] = []
+    for camera in _off(pair.camera, steps[:9]):
         moved = camera.centre - pair.camera.centre
         moved = moved + reach * (camera.rays(cloud.pixels) - rays)
         slid = facing * np.einsum("ij,ij->i", gradient, moved) / along
-        variance += (np.einsum("ij,ij->i", normals, moved) - slid) ** 2
-    for projector in _off(pair.projector, errors):
+        moves.append(np.einsum("ij,ij->i", normals, moved) - slid)
+    for projector in _off(pair.projector, steps[9:]):
         pixels, _ = projector.panel(points)
         drawn = np.linalg.norm(pair.projector.ring_plane(pixels), axis=1)
-        variance += (facing * (drawn - ring(points)) / along) ** 2
-    return np.sqrt(variance) / _SHARE
+        moves.append(facing * (drawn - ring(points)) / along)
+    by_unit = np.stack(moves, axis=1) / np.where(steps > 0.0, steps, 1.0)
+    variance = np.einsum("ij,jk,ik->i", by_unit, covariance, by_unit)
+    return np.sqrt(np.maximum(variance, 0.0))
 
 
-def _off(device: _Device, errors: CalibrationErrors) -> Iterator[_Device]:
-    """Yield the device with each of its errors, a share of its deviation."""
-    pose, matrix = device.world_from_device, device.matrix
-    for axis in np.eye(3):
-        turn, shift = np.eye(4), np.eye(4)
-        turn[:3, :3] = Rotation.from_rotvec(
-            _SHARE * errors.about_axis * axis
-        ).as_matrix()
-        shift[:3, 3] = _SHARE * errors.along_axis_m * axis
-        yield replace(device, world_from_device=pose @ turn)
-        yield replace(device, world_from_device=pose @ shift)
-    longer = matrix.copy()
-    longer[[0, 1], [0, 1]] *= 1.0 + _SHARE * errors.focal
-    yield replace(device, matrix=longer)
-    for row in (0, 1):
-        off_centre = matrix.copy()
-        off_centre[row, 2] += _SHARE * errors.along_line_px
-        yield replace(device, matrix=off_centre)
+def _off(device: _Device, steps: Array) -> Iterator[_Device]:
+    """Yield the device with each of nine errors by itself."""
+    pose = device.world_from_device
+    for k, step in enumerate(steps.tolist()):
+        error, moved, matrix = np.eye(9)[k] * step, np.eye(4), device.matrix.copy()
+        moved[:3, :3] = Rotation.from_rotvec(error[:3]).as_matrix()
+        moved[:3, 3] = error[3:6]
+        matrix[[0, 1], [0, 1]] *= 1.0 + error[6]
+        matrix[:2, 2] += error[7:]
+        yield replace(device, world_from_device=pose @ moved, matrix=matrix)

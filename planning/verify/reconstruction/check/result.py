@@ -17,6 +17,7 @@ from planning.verify.reconstruction.scanner import Scanner
 from .accuracy import Accuracy, Completeness, share_of
 from .comparison import Comparison
 from .merge import Merged
+from .refined_rig import RefinedRig
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ class Reconstruction:
     Attributes:
         everything: All points, before redundancy was removed.
         merged: The cloud that stays, with normals and standard deviations.
-        accuracy: Of the merged cloud; None if it is empty.
+        accuracy: Of the merged cloud, its outside; None if it is empty.
         completeness: Of the target.
         pairs: What each pair gave.
         photometry: The simulated light and sensor; None: the images were taken.
@@ -58,6 +59,9 @@ class Reconstruction:
         seconds: Processor time of `render`, `decode` and `merge` over all pairs [s].
         comparison: With a plan's prediction; None if none was given.
         remarks: What was left out of images, limits being kept or not.
+        refined: The rig that an adjustment made; None if it wasn't asked for.
+        inside_fraction: Share of the merged points that lie on the inside of an open
+            mesh; they don't count into the accuracy.
     """
 
     everything: Cloud
@@ -70,6 +74,8 @@ class Reconstruction:
     seconds: dict[str, float]
     comparison: Comparison | None = None
     remarks: tuple[str, ...] = ()
+    refined: RefinedRig | None = None
+    inside_fraction: float = 0.0
 
     @property
     def passed(self) -> bool:
@@ -112,6 +118,8 @@ class Reconstruction:
             f"{self.n_merged} points of {self.n_points}, {shared:.1%} of them in the "
             f"light of two projectors; {redundant:.1%} redundant, "
             f"{self.step_fraction:.1%} false at steps"
+            + f"; {self.inside_fraction:.1%} on the inside of the open mesh, not judged"
+            * (self.inside_fraction > 0.0)
         )
 
     def record(self) -> ReconstructionRecord:

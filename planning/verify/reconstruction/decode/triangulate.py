@@ -55,7 +55,7 @@ def intersect_rings(
         projector: Whose rings they are.
     """
     o = projector.to_ring(origin[None])[0]
-    q = rays @ projector.world_from_ring[:3, :3]
+    q = rays @ projector.ring_axes
     t = _distance(o, q, radii, roots.astype(np.float64), projector.light)
     with np.errstate(invalid="ignore"):
         bad = ~(t > 0.0)
@@ -64,12 +64,17 @@ def intersect_rings(
     local = o + t[:, None] * q
     with np.errstate(invalid="ignore", divide="ignore"):
         outward = local[:, :2] / np.hypot(local[:, 0], local[:, 1])[:, None]
-    normals = projector.light.ring_normals(outward, radii)
+    local_normals = projector.light.ring_normals(outward, radii)
+    normals = local_normals @ projector.ring_axes.T
+    size = 1.0
+    if projector.drawn_for is not None:
+        size = np.linalg.norm(normals, axis=1)
+        normals /= size[:, None]
     return RingHits(
         points=origin + t[:, None] * rays,
         distances=t,
-        normals=normals @ projector.world_from_ring[:3, :3].T,
-        conditioning=np.einsum("ij,ij->i", q, normals),
+        normals=normals,
+        conditioning=np.einsum("ij,ij->i", q, local_normals) / size,
     )
 
 

@@ -60,18 +60,25 @@ class Adjusted:
         """Distances of edges from their rings after it, as of `Bundle.offsets`."""
         return self.bundle.offsets(self.x)
 
+    @property
+    def scatter(self) -> float:
+        """Deviation of the edges from their rings in units of sigma, by the median."""
+        off = self.bundle.apart_from_relief(np.nan_to_num(self.offsets))
+        return 1.4826 * float(np.median(np.abs(off)))
+
     @cached_property
     def weighed(self) -> tuple[Array, Array]:
         """Slopes of the edges by the unknowns (n, k) and offsets (n,), both weighed.
 
         Each by the square root of what the loss makes of its square.
         """
-        off = self.offsets / self.unit
-        known = np.isfinite(off)
-        slopes = self.bundle.slopes(self.x)[known] / self.unit
-        slopes[~np.isfinite(slopes)] = 0.0
-        weight = (1.0 + off[known] ** 2) ** -0.5
-        return weight[:, None] * slopes, weight * off[known]
+        known = np.isfinite(self.offsets)
+        slopes = np.nan_to_num(self.bundle.slopes(self.x), posinf=0.0, neginf=0.0)
+        off = self.bundle.apart_from_relief(np.where(known, self.offsets, 0.0))
+        slopes = self.bundle.apart_from_relief(slopes)[known] / self.unit
+        off = off[known] / self.unit
+        weight = (1.0 + off**2) ** -0.5
+        return weight[:, None] * slopes, weight * off
 
     @cached_property
     def covariance(self) -> Array:
@@ -109,12 +116,13 @@ def adjust(
 
     def residuals(z: Array) -> Array:
         off = bundle.offsets(whole(z)) / unit
-        return np.concatenate([np.where(np.isfinite(off), off, _MISSED), z])
+        off = bundle.apart_from_relief(np.where(np.isfinite(off), off, _MISSED))
+        return np.concatenate([off, z])
 
     def slopes(z: Array) -> Array:
         by_edge = bundle.slopes(whole(z))[:, free] * scale / unit
         by_edge[~np.isfinite(by_edge)] = 0.0
-        return np.vstack([by_edge, np.eye(len(z))])
+        return np.vstack([bundle.apart_from_relief(by_edge), np.eye(len(z))])
 
     def robust(loss: _Loss) -> _Loss:
         def of_edges(u: Array) -> Array:

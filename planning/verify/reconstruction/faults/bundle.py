@@ -39,10 +39,22 @@ _Device = TypeVar("_Device", CameraCalibration, ProjectorCalibration)
 
 @dataclass(frozen=True, eq=False)
 class Bundle:
-    """Edges, and all that may be changed of how things are supposed to stand."""
+    """Edges, and all that may be changed of how things are supposed to stand.
+
+    Attributes:
+        evidence: The edges.
+        supposed: How everything is supposed to stand.
+        patch: Of the object's surface that each edge lies on, shape (n,); None: the
+            object is the mesh.
+        relief_m: Standard deviation of how far each patch lies off the mesh [m]. What
+            edges of a patch say of that together is taken out of them, so that with a
+            large one only edges of different pairs tell against each other.
+    """
 
     evidence: Evidence
     supposed: Supposed
+    patch: Indices | None = None
+    relief_m: float = 0.0
 
     @property
     def n_unknowns(self) -> int:
@@ -99,6 +111,47 @@ class Bundle:
         slopes = self._slopes(self.moved(x))[0] / self.sigma[:, None]
         return slopes @ self._inner(x)
 
+    @cached_property
+    def _by_relief(self) -> tuple[Array, Array]:
+        """What an offset of a patch does to edges (n,), and its squares' sum (n,)."""
+        rising = np.nan_to_num(self._slopes(self.supposed)[2] / self.sigma)
+        assert self.patch is not None
+        squares = np.bincount(self.patch, rising**2).astype(np.float64)
+        return rising, squares[self.patch]
+
+    def apart_from_relief(self, values: Array) -> Array:
+        """Return offsets or slopes (n, ...) less what offsets of patches explain.
+
+        With l the slopes by a patch's offset h, h of deviation s, and a as below, the
+        sum of the squares of ``r - a l (l.r)`` is the least of ``|r - l h|^2 + h^2 /
+        s^2``::
+
+            a = (1 - 1 / sqrt(1 + s^2 l.l)) / l.l
+        """
+        if self.patch is None or not self.relief_m > 0.0:
+            return values
+        rising, squares = self._by_relief
+        with np.errstate(invalid="ignore", divide="ignore"):
+            a = (1.0 - 1.0 / np.sqrt(1.0 + self.relief_m**2 * squares)) / squares
+        a, columns = np.where(squares > 0.0, a, 0.0), values.reshape(len(values), -1)
+        sums = np.zeros((int(self.patch.max()) + 1, columns.shape[1]))
+        np.add.at(sums, self.patch, rising[:, None] * columns)
+        taken = (a * rising)[:, None] * sums[self.patch]
+        return (columns - taken).reshape(values.shape)
+
+    def relief(self, off: Array) -> float:
+        """Return the deviation of patches [m] that offsets of edges (n,) ask for.
+
+        By the median over patches of two edges or more, which a dent doesn't move.
+        """
+        assert self.patch is not None
+        known = np.isfinite(off)
+        patch, rising = self.patch[known], self._by_relief[0][known]
+        squares = np.bincount(patch, rising**2)
+        measured = (np.bincount(patch) > 1) & (squares > 0.0)
+        heights = np.bincount(patch, rising * off[known])[measured] / squares[measured]
+        return 1.4826 * float(np.median(np.abs(heights))) if len(heights) else 0.0
+
     def _inner(self, x: Array) -> Array:
         """Derivative of changes from where things stand after x, by x: block diagonal.
 
@@ -121,24 +174,24 @@ class Bundle:
             blocks.append(block)
         return np.asarray(block_diag(*blocks), np.float64)
 
-    def _slopes(self, rig: Supposed) -> tuple[Array, Array]:
-        """Derivatives of rho - R by changes of a rig, and by the pixel, its length."""
+    def _slopes(self, rig: Supposed) -> tuple[Array, Array, Array]:
+        """Derivatives of rho - R by a rig's changes, by a pixel, by surface raised."""
         evidence, at = self.evidence, places(self.evidence, rig)
         slopes = np.zeros((len(evidence), self.n_unknowns))
-        per_px = np.zeros(len(evidence))
+        per_px, rising = np.zeros((2, len(evidence)))
         pairs = np.column_stack([evidence.projector, evidence.camera])
         for p, c in np.unique(pairs, axis=0).tolist():
             rows = np.flatnonzero((pairs == (p, c)).all(axis=1))
             there = at[0][rows], at[1][rows]
             with np.errstate(invalid="ignore", divide="ignore"):
                 gradient, of_projector = _projector_slopes(rig, p, there[0])
-                of_camera, of_object, per_px[rows] = _camera_slopes(
+                of_camera, of_object, per_px[rows], rising[rows] = _camera_slopes(
                     rig, c, evidence.pixels[rows], there, gradient
                 )
             slopes[np.ix_(rows, self.columns("projectors", p))] = of_projector
             slopes[np.ix_(rows, self.columns("cameras", c))] = of_camera
             slopes[np.ix_(rows, self.columns("objects", 0))] = of_object
-        return slopes, per_px
+        return slopes, per_px, rising
 
 
 def _projector_slopes(rig: Supposed, p: int, points: Array) -> tuple[Array, Array]:
@@ -148,10 +201,11 @@ def _projector_slopes(rig: Supposed, p: int, points: Array) -> tuple[Array, Arra
     local = (points - pose[:3, 3]) @ pose[:3, :3]
     pixels, _ = projector.panel(points)
     turn = design.ring_from_device
-    q = design.panel_coordinates(pixels)
+    drawn = design.drawn_matrix
+    q = (pixels - drawn[:2, 2]) / np.diag(drawn)[:2]
     plane = law.turned(q, turn)
     across = plane / np.linalg.norm(plane, axis=1, keepdims=True)
-    by_pixel = law.turned_slopes(q, across, turn) / np.diag(design.matrix)[:2]
+    by_pixel = law.turned_slopes(q, across, turn) / np.diag(drawn)[:2]
     focal, centre = np.diag(projector.matrix)[:2], projector.matrix[:2, 2]
     by_place = law.plane_slopes(local, by_pixel * focal)
     zoom = _dot(by_pixel, pixels - centre)
@@ -161,13 +215,14 @@ def _projector_slopes(rig: Supposed, p: int, points: Array) -> tuple[Array, Arra
 
 def _camera_slopes(
     rig: Supposed, c: int, pixels: Array, at: Places, gradient: Array
-) -> tuple[Array, Array, Array]:
-    """Derivatives by the camera and the object, and by a pixel across its ring."""
+) -> tuple[Array, Array, Array, Array]:
+    """Derivatives by camera and object, by a pixel across its ring, by the surface."""
     camera, (body,), (points, normals) = rig.cameras[c], rig.objects, at
     rays = points - camera.centre
     reach = np.linalg.norm(rays, axis=1, keepdims=True)
     rays /= reach
-    lever = _dot(gradient, rays) / _dot(normals, rays) * normals
+    rising = _dot(gradient, rays) / _dot(normals, rays)
+    lever = rising * normals
     turn = camera.world_from_device[:3, :3]
     local, across = (points - camera.centre) @ turn, (gradient - lever) @ turn
     step = 0.5 * np.eye(2)
@@ -186,7 +241,7 @@ def _camera_slopes(
     local, along = (points - body.centre) @ turn, lever @ turn
     of_object = [np.cross(local, along), along, _dot(along, local)]
     per_px = np.linalg.norm(by_pixel, axis=1)
-    return np.column_stack(of_camera), np.column_stack(of_object), per_px
+    return np.column_stack(of_camera), np.column_stack(of_object), per_px, rising[:, 0]
 
 
 def _dot(a: Array, b: Array) -> Array:

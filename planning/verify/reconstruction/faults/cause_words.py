@@ -1,5 +1,8 @@
 """A diagnosis in a sentence, with sizes and an "as if"."""
 
+from dataclasses import replace
+from typing import TypeVar
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -10,8 +13,7 @@ from planning.verify.reconstruction.calibration import (
 )
 from planning.verify.reconstruction.scanner import Scanner
 
-from .diagnosis import Cause
-from .explanations import Explanation
+from .explanations import Cause, Explanation
 from .supposed import GRAZING
 
 _MM = 1e3
@@ -19,6 +21,7 @@ _MM = 1e3
 _NO_TURN = np.deg2rad(0.005)
 # An axis that passes the object by more than this share of its distance isn't aimed.
 _MOST_ASIDE = 0.5
+_Device = TypeVar("_Device", bound=DeviceCalibration)
 
 
 def in_words(cause: Cause, plan: Scanner) -> str:
@@ -45,6 +48,7 @@ def _looks(explanation: Explanation, plan: Scanner) -> str:
         by = float(after.matrix[0, 0] / before.matrix[0, 0]) - 1.0
         longer = "longer" if by > 0.0 else "shorter"
         return f"{names[0]} looks as if its focal length were {_per_cent(by)} {longer}"
+    after = untwisted(before, after)
     away = float(np.linalg.norm(states[0].objects[0].centre - before.centre))
     looks = f"{names[0]} looks as if it {_displaced(before, after, away)}"
     if change.role == "cameras":
@@ -83,6 +87,24 @@ def _displaced(before: DeviceCalibration, after: DeviceCalibration, away: float)
     if moved > 0.0:
         words.append(f"stood {_millimetres(moved)} from its place")
     return " and ".join(words) or "were not moved"
+
+
+def untwisted(before: _Device, after: _Device) -> _Device:
+    """Return a projector with the least turn that draws its rings alike.
+
+    A turn about the rings' axis leaves no trace: of the unit quaternion (v, w) of the
+    whole turn it is that of the part (v.a, w) along the axis a.
+    """
+    if not isinstance(before, ProjectorCalibration):
+        return after
+    device_from_ring = np.linalg.inv(before.ring_from_device)
+    turn = before.world_from_device[:3, :3].T @ after.world_from_device[:3, :3]
+    *vector, scalar = Rotation.from_matrix(turn).as_quat()
+    twist = 2.0 * np.arctan2(np.dot(vector, device_from_ring[:3, 2]), scalar)
+    back = np.eye(4)
+    back[:3, :3] = Rotation.from_rotvec([0.0, 0.0, -twist]).as_matrix()
+    pose = after.world_from_device @ device_from_ring @ back @ before.ring_from_device
+    return replace(after, world_from_device=pose)
 
 
 def _grazing(

@@ -74,6 +74,10 @@ class Explanation:
     left_m: tuple[float, float]
 
 
+# Equally good explanations of one thing that is wrong, the simplest first.
+Cause = tuple[Explanation, ...]
+
+
 def misfit(evidence: Evidence, rig: Supposed, cap_m: float = _CAP_M) -> float:
     """Return the mismatch of edges [m], mean over the pairs."""
     off = np.abs(mismatches(evidence, rig, places(evidence, rig)))
