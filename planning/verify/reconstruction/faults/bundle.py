@@ -30,7 +30,7 @@ from .supposed import Evidence, Places, Role, Supposed, offsets, places
 # length's change as a share and the principal point's [px], of the object its size's.
 TURN, SHIFT, ZOOM, CENTRE = slice(0, 3), slice(3, 6), slice(6, 7), slice(7, 9)
 # Squares of the panel and uneven brightness move edges about so far [px].
-_BIASED_PX = 0.015
+BIASED_PX = 0.015
 _OF_DEVICE, _OF_OBJECT = 9, 7
 # An edge that runs along its viewing ray isn't surer than this share of the median.
 _LEAST_SLOPE = 0.2
@@ -98,7 +98,7 @@ class Bundle:
         typical = np.nanmedian(per_px) if np.isfinite(per_px).any() else 1.0
         per_px = np.where(np.isfinite(per_px), per_px, typical)
         return np.fmax(per_px, _LEAST_SLOPE * typical) * np.hypot(
-            self.evidence.noise_px, _BIASED_PX
+            self.evidence.noise_px, BIASED_PX
         )
 
     def offsets(self, x: Array) -> Array:

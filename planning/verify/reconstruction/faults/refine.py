@@ -15,12 +15,11 @@ from planning.model.calibration_errors import CalibrationErrors
 from planning.verify.reconstruction.arrays import Array, Indices
 from planning.verify.reconstruction.calibration import DeviceCalibration
 from planning.verify.reconstruction.check.refined_rig import Moved, RefinedRig
-from planning.verify.reconstruction.cloud import TEXTURE_PX
 from planning.verify.reconstruction.decode.decode import Decoded, Pairs, measure_edges
 from planning.verify.reconstruction.scanner import Scanner
 
 from .adjustment import Adjusted, adjust, expected_of
-from .bundle import SHIFT, TURN, ZOOM, Bundle
+from .bundle import BIASED_PX, SHIFT, TURN, ZOOM, Bundle
 from .cause_words import in_words, untwisted
 from .diagnosis import MOUNTED, PLACED, reachable
 from .explanations import misfit
@@ -66,7 +65,7 @@ def refine(believed: Scanner, pairs: Pairs) -> RefinedRig | None:
     search = Search(stated, found, least, PLACED)
     causes += search.causes()
     found = search.found
-    px = np.hypot(evidence.noise_px, TEXTURE_PX)
+    px = np.hypot(evidence.noise_px, BIASED_PX)
     before = np.abs(bundle.offsets(np.zeros(bundle.n_unknowns)))
     after = np.abs(bundle.apart_from_relief(np.nan_to_num(found.offsets)))
     return RefinedRig(
