@@ -17,6 +17,10 @@ from planning.verify.audit.coverage.prediction import possible_at_floors
 from planning.verify.audit.figure_claims import compare_figures, contradictions
 from planning.verify.reconstruction.check.accuracy import Expected
 from planning.verify.reconstruction.check.comparison import PredictedSamples, compare
+from planning.verify.reconstruction.check.interreflection import (
+    ALBEDO,
+    interreflection,
+)
 from planning.verify.reconstruction.check.result import Reconstruction
 from planning.verify.reconstruction.reconstruct import reconstruct
 from planning.verify.reconstruction.render.countdown import countdown
@@ -80,6 +84,9 @@ class Verification:
             _areas_line(name, self.coverage[name]) for name in ("target", "surface")
         ]
         lines.append(_pixels_line(self.reconstruction))
+        bounced = self.reconstruction and self.reconstruction.record().interreflection
+        if bounced and bounced.warning():
+            lines.append(f"warning: {bounced.warning()}")
         lines += [f"not met: {sentence}" for sentence in self.unmet]
         lines += [f"FALSE: {sentence}" for sentence in self.failures]
         checked = "pixels checked" if self.reconstruction is not None else "NOT CHECKED"
@@ -220,7 +227,13 @@ def _reconstruct(
         samples, case.samples.weights, case.actual.measured_by, possible
     )
     compared = compare(believed, prediction, pixels.everything, pixels.accuracy)
-    return replace(pixels, comparison=compared)
+    physics = how["physics"]
+    bounced = interreflection(
+        believed,
+        pixels.merged,
+        albedo=ALBEDO if physics is None else physics.surface.albedo,
+    )
+    return replace(pixels, comparison=compared, interreflection=bounced)
 
 
 def bare(samples: AuditSamples) -> SurfaceSamples:

@@ -1,6 +1,8 @@
 """`reconstruction` of a plan file: what the check from pixels found."""
 
-from .part import Part
+from planning.model.words import percent
+
+from .part import Part, Vector3
 
 
 class CompletenessRecord(Part):
@@ -53,6 +55,43 @@ class SurfaceShare(Part):
     bias_m: float | None
 
 
+class InterreflectionRecord(Part):
+    """What light that bounces once between surfaces does to the measured points.
+
+    Attributes:
+        albedo: Share of the light that the object is taken to give back.
+        cell_m: Side of the cells of the world's grid that points are taken together in.
+        n_cells: Cells with measured points.
+        biased: Share of them whose points are moved by more than their sigma.
+        worst_m: Of these the largest displacement along the normal; None: there is
+            none.
+        worst_sigma_m: Sigma of the noise there.
+        worst_at: Where that is.
+    """
+
+    albedo: float
+    cell_m: float
+    n_cells: int
+    biased: float
+    worst_m: float | None = None
+    worst_sigma_m: float | None = None
+    worst_at: Vector3 | None = None
+
+    def warning(self) -> str:
+        """Return a sentence where some cell is biased, else nothing."""
+        if self.worst_m is None or self.worst_at is None:
+            return ""
+        place = ", ".join(f"{1e3 * x:.0f}" for x in self.worst_at)
+        sigma = 1e3 * (self.worst_sigma_m or 0.0)
+        return (
+            f"light that bounces between surfaces moves {percent(self.biased)} of "
+            f"{1e3 * self.cell_m:.0f} mm cells by more than their noise, if the object "
+            f"gives back {percent(self.albedo, decimals=0)} of it: worst by "
+            f"{1e3 * self.worst_m:+.3f} mm (sigma {sigma:.3f}) "
+            f"at ({place}) mm"
+        )
+
+
 class ReconstructionRecord(Part):
     """Errors, completeness and verdict.
 
@@ -79,5 +118,6 @@ class ReconstructionRecord(Part):
     by_region: tuple[SurfaceShare, ...] = ()
     dominant: SurfaceShare | None = None
     whole_surface: SurfaceShare | None = None
+    interreflection: InterreflectionRecord | None = None
     passed: bool
     failures: tuple[str, ...]

@@ -39,6 +39,9 @@ def check_lines(plan: RigPlan) -> list[str]:
         f"of the target predicted measured: {near}; "
         f"{missing} missing ({100 * limits.max_predicted_missing:g} %)",
     ]
+    bounced = check.interreflection
+    if bounced and bounced.warning():
+        lines.append(f"WARNING: {bounced.warning()}")
     return ["", *labelled("CHECK", lines + _agreement(check))]
 
 

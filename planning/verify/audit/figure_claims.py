@@ -43,6 +43,12 @@ def compare_figures(
     for name in ("confusion", "dominant", "whole_surface"):
         tables = getattr(recorded, name), getattr(fresh, name)
         _compare_shares(*tables, findings.at(name))
+    bounced, again = recorded.interreflection, fresh.interreflection
+    if bounced is not None and again is not None:
+        # Few paths are followed, of other points.
+        slack = max(0.25 * again.biased, 0.02)
+        key = "interreflection.biased"
+        findings.number(key, bounced.biased, again.biased, slack, "")
     rows, key = recorded.completeness, "completeness"
     if len(rows) != len(fresh.completeness):
         findings.fail(key, f"{len(rows)} rows are claimed")

@@ -16,6 +16,7 @@ from planning.verify.reconstruction.scanner import Scanner
 
 from .accuracy import Accuracy, Completeness, share_of
 from .comparison import Comparison
+from .interreflection import Interreflection
 from .merge import Merged
 from .refined_rig import RefinedRig
 
@@ -62,6 +63,7 @@ class Reconstruction:
         refined: The rig that an adjustment made; None if it wasn't asked for.
         inside_fraction: Share of the merged points that lie on the inside of an open
             mesh; they don't count into the accuracy.
+        interreflection: What one bounce of light would do; None: nobody asked.
     """
 
     everything: Cloud
@@ -76,6 +78,7 @@ class Reconstruction:
     remarks: tuple[str, ...] = ()
     refined: RefinedRig | None = None
     inside_fraction: float = 0.0
+    interreflection: Interreflection | None = None
 
     @property
     def passed(self) -> bool:
@@ -146,6 +149,7 @@ class Reconstruction:
             pixel_noise=light and light.pixel_noise,
             ambient=light and light.ambient,
             **compared,
+            interreflection=self.interreflection and self.interreflection.record(),
             passed=self.passed,
             failures=self.failures,
         )

@@ -31,7 +31,8 @@ class Surface:
 
     Attributes:
         albedo: Share of the light that a matt surface gives back, in the mean.
-        texture: Amplitude of a solid texture about it, as a share of it.
+        texture: Amplitude of a solid texture about it, as a share of it, where matt or
+            metal.
 
     Raises:
         InputError: If some of the surface would give back more than it gets.
@@ -57,7 +58,9 @@ class Surface:
             "matt": f'<bsdf type="diffuse">{albedo.format("reflectance")}</bsdf>',
             "gloss": '<bsdf type="roughplastic"><float name="alpha" value="0.1"/>'
             '<float name="int_ior" value="1.5"/><boolean name="nonlinear" '
-            f'value="true"/>{albedo.format("diffuse_reflectance")}</bsdf>',
+            # Mitsuba mixes gloss and body by the mean albedo, which vertices lack.
+            'value="true"/><rgb name="diffuse_reflectance" '
+            f'value="{self.albedo}"/></bsdf>',
             "metal": '<bsdf type="roughconductor"><string name="material" '
             'value="none"/><float name="alpha" value="0.25"/>'
             f"{albedo.format('specular_reflectance')}</bsdf>",
@@ -89,8 +92,9 @@ class Surface:
             '<bsdf type="twosided"><bsdf type="roughconductor"><string name="material" '
             'value="none"/><float name="alpha" value="0.3"/></bsdf></bsdf></bsdf>'
             '<medium type="homogeneous" name="interior"><rgb name="sigma_t" '
-            f'value="{_SCATTERING / single:.6g}"/><rgb name="albedo" '
-            f'value="{single:.6g}"/><phase type="isotropic"/></medium>'
+            f'value="1"/><float name="scale" value="{_SCATTERING / single:.6g}"/>'
+            f'<rgb name="albedo" value="{single:.6g}"/>'
+            '<phase type="isotropic"/></medium>'
         )
         return scene_of([integrator, _shape(skin)])
 

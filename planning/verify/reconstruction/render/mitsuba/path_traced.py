@@ -217,11 +217,11 @@ class PathTracer:
     def _loaded(self, text: str) -> Any:  # noqa: ANN401
         path = self._place / "scene.xml"
         path.write_text(text)
-        return self._mi.load_file(
-            str(path),
-            material=self._physics.material,
-            max_depth=str(2 + self._physics.bounces),
-        )
+        values = {"material": self._physics.material}
+        if self._physics.material != "skin":
+            # Mitsuba refuses a parameter that nothing takes.
+            values["max_depth"] = str(2 + self._physics.bounces)
+        return self._mi.load_file(str(path), **values)
 
     def _image(self, scene: Any, place: int, spp: int, seed: int) -> Grey:  # noqa: ANN401
         return np.array(self._mi.render(scene, sensor=place, spp=spp, seed=seed))
