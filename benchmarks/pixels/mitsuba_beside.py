@@ -22,7 +22,11 @@ from support import reconstruction_rigs as rigs
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import sample_surface
 from geometry.shapes.sample_head.sample_head import sample_head
-from planning.verify.reconstruction.check.accuracy import Expected, nearest_distance
+from planning.verify.reconstruction.check.accuracy import (
+    Expected,
+    measure_accuracy,
+    nearest_distance,
+)
 from planning.verify.reconstruction.check.result import Reconstruction
 from planning.verify.reconstruction.reconstruct import reconstruct
 from planning.verify.reconstruction.render.mitsuba.materials import Surface
@@ -96,12 +100,17 @@ def edges_apart(ours: Reconstruction, theirs: Reconstruction) -> tuple[_Array, f
     return np.linalg.norm(apart[alike], axis=1), float(found.mean())
 
 
-def deciles(result: Reconstruction) -> str:
-    """Return rms of error / sigma in each decile of sigma, and over all."""
-    assert result.accuracy is not None
+def over_sigma(result: Reconstruction, mesh: TriangleMesh) -> tuple[_Array, _Array]:
+    """Return error / sigma and sigma of the merged points where sigma is known."""
     known = np.isfinite(result.merged.sigma)
     sigma = result.merged.sigma[known]
-    ratio = result.accuracy.distances[known] / sigma
+    cloud = result.merged.cloud.take(known)
+    return measure_accuracy(cloud, mesh).distances / sigma, sigma
+
+
+def deciles(result: Reconstruction, mesh: TriangleMesh) -> str:
+    """Return rms of error / sigma in each decile of sigma, and over all."""
+    ratio, sigma = over_sigma(result, mesh)
     order = np.argsort(sigma, kind="stable")
     parts = [_rms(ratio[part]) for part in np.array_split(order, 10)]
     return " ".join(f"{part:.2f}" for part in parts) + f"   all {_rms(ratio):.2f}"
@@ -123,7 +132,9 @@ def beside(name: str, scanner: Scanner, spp: int) -> None:
         )
         if light.noisy:
             for who, one in (("built-in", ours), ("Mitsuba", theirs)):
-                print(f"| {name}, error / sigma, {who} | {deciles(one)} | | | |")
+                print(
+                    f"| {name}, error / sigma, {who} | {deciles(one, scanner.mesh)} | | | |"
+                )
     print(f"<!-- {time.monotonic() - begin:.0f} s -->", flush=True)
 
 
@@ -149,16 +160,15 @@ def effects(name: str, scanner: Scanner, spp: int) -> None:
         result = reconstruct(
             stands, seed=0, expected=expected, photometry=light, physics=physics
         )
-        print(_line(effect.name, result), flush=True)
+        print(_line(effect.name, result, scanner.mesh), flush=True)
 
 
-def _line(name: str, result: Reconstruction) -> str:
+def _line(name: str, result: Reconstruction, mesh: TriangleMesh) -> str:
     told = "; ".join(result.failures + result.remarks) or "nothing: limits are kept"
     errors = result.accuracy
     if errors is None:
         return f"| {name} | | | | | | | {told} |"
-    known = np.isfinite(result.merged.sigma)
-    ratio = _rms(errors.distances[known] / result.merged.sigma[known])
+    ratio = _rms(over_sigma(result, mesh)[0])
     left_out = sum(sum(pair.rejected.values()) for pair in result.pairs)
     share = left_out / max(1, sum(pair.n_edges for pair in result.pairs))
     false = float(np.mean(np.abs(errors.distances) > _FALSE_M))
