@@ -132,9 +132,8 @@ def beside(name: str, scanner: Scanner, spp: int) -> None:
         )
         if light.noisy:
             for who, one in (("built-in", ours), ("Mitsuba", theirs)):
-                print(
-                    f"| {name}, error / sigma, {who} | {deciles(one, scanner.mesh)} | | | |"
-                )
+                row = deciles(one, scanner.mesh)
+                print(f"| {name}, error / sigma, {who} | {row} | | | |")
     print(f"<!-- {time.monotonic() - begin:.0f} s -->", flush=True)
 
 
