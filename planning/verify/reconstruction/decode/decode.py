@@ -149,11 +149,13 @@ def measure_edges(
     min_conditioning: float,
     max_slant: float = _MAX_SLANT,
     believed: bool = True,
+    sure_roots: bool = False,
     lit: LitImage | None = None,
 ) -> Decoded:
     """Measure the points of labelled edges, wherever the labels come from.
 
-    Unless the labels can be believed, all edges are left out. Saturated pixels are
+    Unless the labels can be believed, all edges are left out; with `sure_roots` those
+    whose root the devices' places contradict. Saturated pixels are
     (u, v), shape (k, 2); the rest is as in `decode` and `Decoded`.
     """
     camera, projector = calibration.camera, calibration.projector
@@ -163,7 +165,7 @@ def measure_edges(
     length, across = chains(edges, hits, camera.focal_px, max_slant)
     causes = {
         "no_intersection": ~np.isfinite(hits.distances),
-        "root": _doubtful_root(edges, rays, patterns, calibration),
+        "root": _doubtful_root(edges, rays, patterns, calibration, sure_roots),
         "conditioning": ~(np.abs(hits.conditioning) >= min_conditioning),
         "outside_panel": ~projector.in_panel(projector.panel(hits.points)[0], 1.0),
         "isolated": length < _MIN_CHAIN,
@@ -196,8 +198,13 @@ def _doubtful_root(
     rays: Array,
     patterns: RingsForCamera,
     calibration: PairCalibration,
+    sure: bool,
 ) -> Mask:
-    """Edges of which both roots, or neither, lie on the side that the disc told."""
+    """Edges of which both roots, or neither, lie on the side that the disc told.
+
+    Far from the place that the disc was drawn for, where `sure`, all but those of which
+    the told one does, and it alone.
+    """
     # Away from the place that the disc was drawn for, they differ near its border.
     camera, projector = calibration.camera, calibration.projector
     place = projector.to_ring(camera.centre[None])[0]
@@ -212,7 +219,8 @@ def _doubtful_root(
         side = patterns.root_side(patterns.light.plane(local))
         return (np.sign(side) == edges.roots) & inside
 
-    return fits(edges.roots) == fits(-edges.roots)
+    told, other = fits(edges.roots), fits(-edges.roots)
+    return ~told | other if sure else told == other
 
 
 def _out_of_order(flips: Indices, named: Indices) -> bool:

@@ -27,14 +27,14 @@ def explained(failures: tuple[str, ...], measured: MeasuredClouds) -> tuple[str,
     # Edges of disordered frames, or of two projectors at once, are no evidence.
     blurred = [*_unordered(measured), *_double_light(measured)]
     causes = [*blurred, *_dark(measured)]
+    remark: str | None = None
     if not blurred:
         diagnosed = diagnose(plan, Evidence.of(plan, decoded))
         causes += [in_words(cause, plan) for cause in diagnosed.causes]
         causes += wrong_roots(plan, decoded) if not diagnosed.causes else []
-        if diagnosed.remark and not causes:
-            causes = [diagnosed.remark]
+        remark = diagnosed.remark
     incomplete = where_missing(measured, displaced=bool(causes)) + causes
-    inaccurate = causes or [where_inaccurate(plan, measured.cloud)]
+    inaccurate = causes or [remark or where_inaccurate(plan, measured.cloud)]
     # So `judge` words that something is missing.
     absent = "predicted measured"
     sentences: list[str] = []

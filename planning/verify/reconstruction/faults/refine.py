@@ -93,6 +93,7 @@ def remeasured(design: Scanner, rig: Scanner, pairs: Pairs) -> Pairs:
             pair.saturated,
             min_conditioning=limits["min_conditioning"],
             max_slant=limits["max_slant"],
+            sure_roots=True,
             lit=pair.lit,
         )
         return replace(new, n_saturated=pair.n_saturated, saturated=pair.saturated)
