@@ -230,6 +230,7 @@ def test_the_audit_imports_nothing_of_the_planner():
         "planning.model.requirements",
         "planning.model.surface",
         "planning.model.bodies",
+        "planning.model.calibration_errors",
         "planning.model.errors",
         "planning.model.files",
         "geometry.mesh.mesh",
