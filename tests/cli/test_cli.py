@@ -60,7 +60,8 @@ def face(tmp_path_factory):
     return path
 
 
-# A head is seen from the front alone: two or so of each device do.
+# A head is seen from the front alone: two or so of each device do, where a calibration
+# costs nothing.
 RIG = """
 base = "default"
 name = "front"
@@ -68,6 +69,9 @@ name = "front"
 shape = "cone"
 axis = [0.0, -1.0, 0.0]
 half_angle_deg = 40.0
+[calibration]
+angle_deg = 0.0
+position_mm = 0.0
 [requirements]
 dominant_coverage = 0.85
 coverage = 0.9

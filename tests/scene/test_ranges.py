@@ -391,6 +391,7 @@ def plan(body, with_few_samples, tmp_path_factory):
         "n_candidate_cameras = 60\nn_reference_projectors = 600\n"
         "n_reference_cameras = 400\n[requirements]\nmin_reachable = 0.1\n"
         '[workspace]\nshape = "cone"\naxis = [0, -1, 0]\nhalf_angle_deg = 22\n'
+        "[calibration]\nangle_deg = 0.0\nposition_mm = 0.0\n"
     )
     spared: list[float] = []
 
