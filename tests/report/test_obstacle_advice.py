@@ -1,5 +1,6 @@
 """Advice names the obstacle that is in the way."""
 
+from support.factories import EXACT
 from support.plain_shapes import box as plate_of
 
 from planning import RequirementError, load_rig, plan_rig
@@ -10,7 +11,7 @@ LID = (
     '[[obstacle]]\nname = "post"\nshape = "cylinder"\ncentre_mm = [700, 0, 0]\n'
     "radius_mm = 10\nheight_mm = 300\n"
 )
-FEW = (
+FEW = EXACT + (
     "[placement]\nn_candidate_projectors = 600\nn_reference_projectors = 600\n"
     "n_candidate_cameras = 400\nn_reference_cameras = 400\n"
 )

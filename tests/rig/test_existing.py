@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from support.factories import make_projector, make_requirements, make_scene
+from support.factories import EXACT, make_projector, make_requirements, make_scene
 from support.plain_shapes import box
 from support.written import requirements_of
 
@@ -216,6 +216,7 @@ def planned(tmp_path_factory, with_few_samples):
     path = tmp_path_factory.mktemp("rig") / "old.toml"
     path.write_text(
         'base = "default"\n'
+        + EXACT
         + OLD
         + OLD.replace('"old projector"', '"old camera"')
         .replace('"projector"', '"camera"')

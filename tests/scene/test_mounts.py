@@ -298,6 +298,9 @@ def furthest_share(scene, projectors):
 # ---- a whole plan
 
 STEPPED = """
+[calibration]
+angle_deg = 0.0
+position_mm = 0.0
 [workspace]
 origin = "mesh"
 [projector.mount]

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import trimesh
+from support.factories import EXACT
 from support.plain_shapes import box as plate_of
 
 from geometry.files.interchange import to_trimesh
@@ -28,7 +29,7 @@ from planning.verify.audit.audit import audit_plan
 from planning.verify.reconstruction.render.occluders import obstacles_of
 
 CENTRE = np.array([0.3, -0.2, 0.5])
-SMALL = (
+SMALL = EXACT + (
     "[requirements]\ncoverage = 0.8\ndominant_coverage = 0.8\nmin_reachable = 0.1\n"
     "[placement]\nn_candidate_projectors = 600\nn_reference_projectors = 600\n"
     "n_candidate_cameras = 400\nn_reference_cameras = 400\n"

@@ -14,6 +14,8 @@ from planning.scene.lights import ring_frame
 from planning.scene.scene import Scene
 
 TAU_M = 0.004
+# Of a rig file, for tests that aren't about what a calibration leaves.
+EXACT = "[calibration]\nangle_deg = 0.0\nposition_mm = 0.0\n"
 
 
 def make_rig(light: str = "diverging") -> Rig:

@@ -13,6 +13,9 @@ from planning.cli.main import commands
 RIG = """
 base = "default"
 name = "few candidates"
+[calibration]
+angle_deg = 0.0
+position_mm = 0.0
 [placement]
 n_candidate_projectors = 40
 n_candidate_cameras = 40
