@@ -22,11 +22,9 @@ name = "above"
 shape = "cone"
 axis = {axis}
 half_angle_deg = 65.0
-[calibration]
-angle_deg = 0.0
-position_mm = 0.0
 [requirements]
 dominant_coverage = 0.6
+region_coverage = 0.0
 coverage = 0.8
 min_reachable = 0.3
 [placement]

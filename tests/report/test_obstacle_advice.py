@@ -30,6 +30,7 @@ def test_where_too_little_can_be_lit_the_obstacle_in_the_way_is_named(
                 load_rig(path),
                 max_projectors=2,
                 target="surface",
+                cameras_by="cover",
                 check=False,
             )
     except RequirementError as missed:

@@ -232,7 +232,12 @@ def planned(tmp_path_factory, with_few_samples):
     try:
         with with_few_samples():
             return plan_rig(
-                plate, load_rig(path), max_projectors=3, target="surface", check=False
+                plate,
+                load_rig(path),
+                max_projectors=3,
+                target="surface",
+                cameras_by="cover",
+                check=False,
             )
     except RequirementError as missed:
         return missed.plan

@@ -15,7 +15,7 @@ def test_a_plate_of_a_tenth_of_a_millimetre_bears_the_audit(
     lines += [f"f {' '.join(side)}" for side in _SIDES.split()]
     (tmp_path / "plate.obj").write_text("\n".join(lines))
     with with_few_samples():
-        words = ["--target", "surface"]
+        words = ["--target", "surface", "--cameras-by", "cover"]
         ended = small_job.run(tmp_path / "plate.obj", tmp_path, words)
         assert ended.code == 0, ended.message
         plan = RigPlan.load(tmp_path / "plan" / "plan.json")
