@@ -55,7 +55,7 @@ class KeepOutTable(Table):
         return _box(self.name, self.centre_mm, self.size_mm, axes)
 
 
-class MountingTable(Table):
+class MountingSurfaceTable(Table):
     """A rectangle on which optical centres may lie, `[[workspace.mounting]]`.
 
     Its first side runs `along`, as far as that lies in the plane; absent: level, or
@@ -107,7 +107,7 @@ class WorkspaceTable(Table):
     up: UpName = "z"
     origin: Literal["centre", "mesh"] = "centre"
     keep_out: list[KeepOutTable] = Field(default=[])
-    mounting: list[MountingTable] = Field(default=[])
+    mounting: list[MountingSurfaceTable] = Field(default=[])
 
     @model_validator(mode="after")
     def _check_shape(self) -> Self:
