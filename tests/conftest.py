@@ -14,16 +14,19 @@ from threadpoolctl import threadpool_limits
 # Files whose tests plan rigs or take long: begun first, so that no worker ends on one.
 _LONGEST = (
     "pipeline",
+    "captures",
     "cli",
-    "audit_claims",
-    "flips",
-    "continuous",
-    "closed_forms",
+    "obstacles",
     "invariance",
+    "flips",
+    "evaluation",
+    "reconstruction_check",
+    "reconstruction_diagnosis",
+    "camera_routes",
     "existing",
-    "relaxations",
-    "zones",
-    "interest",
+    "audit_claims",
+    "ranges",
+    "closed_forms",
 )
 
 
