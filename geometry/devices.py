@@ -7,11 +7,13 @@ questions about their field, so that callers needn't ask which one they have.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from .arrays import Array, Mask
+
+_Length = TypeVar("_Length", float, Array)
 
 _UNDISTORT_STEPS = 12
 _AHEAD = np.array([0.0, 0.0, 1.0])
@@ -114,7 +116,7 @@ class PinholeModel:
         # With lens shift the image is a trapezoid across the line of sight.
         return distance * np.min(np.abs(across[:, :2] / across[:, 2:]), axis=0)
 
-    def pixel_m(self, distance: float) -> float:
+    def pixel_m(self, distance: _Length) -> _Length:
         """Return the side of a pixel on a surface across the axis [m]."""
         return distance / self.focal_px
 
@@ -277,8 +279,8 @@ class ParallelModel:
         short = min(float(half.min()), beam / np.sqrt(2.0))
         return np.minimum(half, max(short, np.sqrt(beam**2 - short**2)))
 
-    def pixel_m(self, distance: float) -> float:
-        """As of `PinholeModel`."""
+    def pixel_m(self, distance: object) -> float:
+        """As of `PinholeModel`, whatever the distance."""
         return self.pixel_pitch_m
 
     def widened(self, times: int) -> "ParallelModel":

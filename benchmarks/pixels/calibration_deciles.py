@@ -63,9 +63,11 @@ class BestPairs:
         n = len(lit.target)
         figures, best = np.zeros((3, n)), np.full((2, n), -1)
         least = np.full(n, np.inf)
+        # Rigs are drawn, and edges; what the panel's pixels do stays out of both sides.
+        limits = replace(plan.requirements.triangulation, drawn_edges=None)
         for c, camera in enumerate(plan.cameras):
             view = view_of(scene, camera, lit.target)
-            for pair in pairs_of(plan.requirements.triangulation, lit, view):
+            for pair in pairs_of(limits, lit, view):
                 total = np.where(pair.measured, pair.quality.total, np.inf)
                 better = np.flatnonzero(total < least[pair.samples])
                 rows = pair.samples[better]

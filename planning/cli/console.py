@@ -17,7 +17,7 @@ from typing import Any, NoReturn, cast
 import click
 
 from planning.model.progress import Report
-from planning.model.shares import percent_as_share
+from planning.model.words import percent_as_share
 
 _Command = Callable[..., Any]
 # As in sysexits.h: a bug of ours, nothing that the user did.

@@ -9,9 +9,13 @@ from geometry.files.readers import load_mesh
 from planning.model.words import percent
 from planning.rig.lens_fit import LensFit
 from planning.rig.rig import load_rig
+from planning.rig.rig_devices import drawn_edges, farthest_off, straighter_focus
 
 from .console import print_json
 from .lines.object_lines import size_lines
+
+# Edges that lie off by more are worth another focus [px of the projector].
+STRAIGHT_PX = 0.02
 
 
 def lens_command(options: Mapping[str, Any]) -> int:
@@ -28,6 +32,25 @@ def lens_command(options: Mapping[str, Any]) -> int:
         lines += [f"  {line}" for line in _lines(fit)]
     click.echo("\n".join(lines))
     return 0
+
+
+def _edge_words(fit: LensFit) -> str:
+    """How far ring edges lie off by the panel's pixels, and which focus is better."""
+    drawn = drawn_edges(fit.table, fit.device)
+    off_px, at_m = farthest_off(drawn, fit.device, fit.depths_m)
+    off_mm = 1e3 * off_px * fit.device.pixel_m(at_m)
+    words = (
+        f"ring edges lie {off_px:.3f} px ({off_mm:.3f} mm) off their rings or less, "
+        f"before the camera's own blur; most at {1e3 * at_m:.0f} mm"
+    )
+    if off_px <= STRAIGHT_PX:
+        return words
+    better = straighter_focus(drawn, fit.device, fit.depths_m, STRAIGHT_PX)
+    if better is None or better.focus_m is None:
+        return words
+    return (
+        f"{words}; focused at {1e3 * better.focus_m:.0f} mm {STRAIGHT_PX:g} px or less"
+    )
 
 
 def _lines(fit: LensFit) -> Iterator[str]:
@@ -50,6 +73,8 @@ def _lines(fit: LensFit) -> Iterator[str]:
     )
     yield f"as it is: {fit.lens_words(fit.device)} {fit.focus_words(fit.device)}"
     yield f"at best: {fit.advice()}"
+    if fit.role == "projector":
+        yield _edge_words(fit)
     away = fit.standoff_that_holds_m
     if away is not None:
         yield f"as it is it shows all of it from a standoff of {1e3 * away:.0f} mm on"

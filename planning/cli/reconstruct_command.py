@@ -18,7 +18,8 @@ from planning.model.errors import CapturesError
 from planning.model.files import write_atomically
 from planning.model.plan import RigPlan
 from planning.model.progress import Report
-from planning.model.words import count_words, error_words
+from planning.model.words import count_words
+from planning.report.summary.check_lines import error_words
 from planning.verify.audit.coverage.prediction import predict_measured
 from planning.verify.reconstruction.captures.calibration_file import calibrated
 from planning.verify.reconstruction.captures.captured import (

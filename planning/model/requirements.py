@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 from .bodies import Body, Box, Mount, Triple
 from .calibration_errors import PERFECT, CalibrationErrors, Robust
+from .light.drawn_edges import DrawnEdges
 
 # Of a workspace: zones and standoffs that aren't given have no key.
 _ZONES = ("box", "keep_out", "mounting")
@@ -62,6 +63,7 @@ class TriangulationLimits:
         calibration: What a calibration leaves of each device; None: nobody says.
         accuracy_of: Whether `max_sigma_m` limits `noise` alone, or the `total` with
             what the calibration leaves.
+        drawn_edges: What blurs the panel's pixels; None: edges lie on their rings.
     """
 
     min_conditioning: float
@@ -73,6 +75,7 @@ class TriangulationLimits:
     max_angle: float | None = None
     calibration: CalibrationErrors | None = None
     accuracy_of: Literal["noise", "total"] = "total"
+    drawn_edges: DrawnEdges | None = None
 
     @property
     def limited_calibration(self) -> CalibrationErrors:

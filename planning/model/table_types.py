@@ -9,7 +9,7 @@ from pydantic_core import ErrorDetails
 
 from geometry.arrays import Array
 
-from .shares import percent_as_share
+from .words import percent_as_share
 
 Positive = Annotated[float, Field(gt=0.0)]
 Share = Annotated[float, BeforeValidator(percent_as_share), Field(gt=0.0, le=1.0)]

@@ -2,8 +2,6 @@
 
 from collections.abc import Sequence
 
-from .requirements import CheckLimits
-
 # Areas below this are told in mm² [m²].
 _SMALL_M2 = 1e-4
 
@@ -20,15 +18,6 @@ def count_words(count: int, noun: str) -> str:
     return f"{count} {noun}{'s' * (count != 1)}"
 
 
-def error_words(rms_m: float, p95_m: float, bias_m: float, limits: CheckLimits) -> str:
-    """Return the errors of points from the surface in mm, each with its limit."""
-    return (
-        f"rms {1e3 * rms_m:.3f} mm (limit {1e3 * limits.max_rms_m:g}), "
-        f"p95 {1e3 * p95_m:.3f} ({1e3 * limits.max_p95_m:g}), "
-        f"bias {1e3 * bias_m:+.3f} ({1e3 * limits.max_bias_m:g})"
-    )
-
-
 def percent(share: float, *, decimals: int = 1) -> str:
     """Return a share in percent."""
     return f"{100.0 * share:.{decimals}f} %"
@@ -37,3 +26,14 @@ def percent(share: float, *, decimals: int = 1) -> str:
 def labelled(label: str, lines: Sequence[str]) -> list[str]:
     """Return lines of a block of the summary: its label stands before the first."""
     return [f"{'' if k else label:<9}{line}" for k, line in enumerate(lines)]
+
+
+def percent_as_share(value: object) -> object:
+    """Return 0.95 for "95 %", and anything else as it is.
+
+    Raises:
+        ValueError: If what stands before the sign isn't a number.
+    """
+    if isinstance(value, str) and value.endswith("%"):
+        return float(value[:-1]) / 100.0
+    return value

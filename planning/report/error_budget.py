@@ -4,6 +4,7 @@ import numpy as np
 
 from planning.model.document.coverage_records import PredictedSigma
 from planning.scene.camera_views import view_of
+from planning.scene.limits.pair_limits import NOISE_TERMS
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.measured import LitSamples, pairs_of
 from planning.scene.scene import Scene
@@ -32,7 +33,7 @@ def error_budget(
             for name, term in pair.quality.terms.items():
                 of_name = variance.setdefault(name, np.zeros(len(chosen)))
                 of_name[rows] = term[better] ** 2
-    noise = np.sqrt(variance["edges"] + variance.get("rings", 0.0))
+    noise = np.sqrt(sum(variance.get(name, 0.0) for name in NOISE_TERMS))
     (median, p95), (noise_median, noise_p95) = (
         np.quantile(values, (0.5, 0.95)).tolist() for values in (least, noise)
     )

@@ -26,15 +26,18 @@ from .existing_tables import build_existing, check_existing
 from .lens_fit import LensFit, unsharp
 from .object_size import ObjectSize
 from .obstacle_tables import obstacles_of
-from .rig_devices import device_document, parallel_device, pinhole_device
+from .rig_devices import (
+    device_document,
+    drawn_edges,
+    parallel_device,
+    pinhole_device,
+)
 from .rig_files import read_rig, rig_folder
-from .rig_requirements import build_requirements, build_workspace
+from .rig_requirements import build_requirements, build_workspace, limit_notes
 from .rig_tables import MountingTable, ParallelTable, PinholeTable, RigTable, RingsTable
 from .wishes import Wishes
 
 Light = Literal["diverging", "parallel"]
-
-_WARN_INCIDENCE_DEG = 70.0
 
 
 def load_rig(
@@ -157,20 +160,7 @@ class Rig:
 
     def notes(self) -> tuple[str, ...]:
         """Return what a user should know of these limits, a sentence each."""
-        limits = self.table.limits
-        theta, tau = limits.projector_max_incidence_deg, limits.min_tangent_angle_deg
-        sentences: list[str] = []
-        if tau <= 90.0 - theta:
-            sentences.append(
-                f"the tangent limit of {tau:g} degrees doesn't bind: at an incidence "
-                f"of {theta:g} degrees or less the angle is {90.0 - theta:g} or more"
-            )
-        if theta > _WARN_INCIDENCE_DEG:
-            sentences.append(
-                f"projector incidence up to {theta:g} degrees: errors triple at 75, "
-                f"and at 84 only 0.6 of the surface is measured"
-            )
-        return tuple(sentences)
+        return limit_notes(self.table.limits)
 
     def requirements(
         self,
@@ -204,7 +194,10 @@ class Rig:
             ),
         )
         workspace = replace(workspace, **self.mounts())
-        required = build_requirements(self.table, wishes, workspace, tau_m=tau_m)
+        drawn = drawn_edges(self._projector_table, projector)
+        required = build_requirements(
+            self.table, wishes, workspace, tau_m=tau_m, drawn_edges=drawn
+        )
         devices = {
             "projector": (projector, self.projector_body()),
             "camera": (camera, self.camera_body()),

@@ -1,7 +1,7 @@
 """Devices of a rig file, turned into optical models in pixels and metres."""
 
 import math
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any, cast
 
 import numpy as np
@@ -9,12 +9,16 @@ import numpy as np
 from geometry.devices import DeviceModel, ParallelModel, PinholeModel
 from planning.model.bodies import Body
 from planning.model.errors import RigError
+from planning.model.light.drawn_edges import DrawnEdges
+from planning.model.planned import edge_linearity_px
 
 from . import optics
 from .rig_tables import ParallelTable, PinholeTable
 
 # Projectors of the shortest throw look 60 degrees or so off their axes.
 _FARTHEST_OFF = math.radians(75.0)
+# Depths at which edges are looked at.
+_DEPTHS = 65
 _UNSAID = "stated in the rig file, without a source"
 
 
@@ -64,6 +68,53 @@ def parallel_device(table: ParallelTable) -> ParallelModel:
         (low * 1e-3, high * 1e-3),
         None if radius is None else radius * 1e-3,
     )
+
+
+def drawn_edges(table: PinholeTable | ParallelTable, device: DeviceModel) -> DrawnEdges:
+    """Return what blurs the edges that a projector draws; unsaid: its focus doesn't."""
+    if isinstance(table, ParallelTable) or table.focus is None:
+        return DrawnEdges()
+    assert isinstance(device, PinholeModel)
+    focal_m = device.focal_px * _pixel_m(table)
+    return DrawnEdges(
+        focus_m=1e-3 * table.focus.distance_mm,
+        aperture_m=focal_m / table.focus.f_number,
+    )
+
+
+def farthest_off(
+    drawn: DrawnEdges, device: DeviceModel, depths_m: tuple[float, float]
+) -> tuple[float, float]:
+    """Return how far drawn edges lie off at most between two depths, and where.
+
+    By blur of the light alone, rms in pixels of the projector and [m].
+    """
+    depths = np.linspace(*depths_m, _DEPTHS)
+    off = edge_linearity_px(drawn.light_m(depths) / device.pixel_m(depths))
+    return float(off.max()), float(depths[off.argmax()])
+
+
+def straighter_focus(
+    drawn: DrawnEdges,
+    device: DeviceModel,
+    depths_m: tuple[float, float],
+    most_px: float,
+) -> DrawnEdges | None:
+    """Return the focus whose edges lie no farther off, with the least blur; or None.
+
+    Nearer or farther than the object: in focus the panel's squares show.
+    """
+    if drawn.focus_m is None:
+        return None
+    near, far = depths_m
+    best, least = None, np.inf
+    for focus in np.geomspace(0.5 * near, 2.0 * far, 4 * _DEPTHS).tolist():
+        # The pupil is fixed: a lens that is focused elsewhere hardly changes length.
+        other = replace(drawn, focus_m=focus)
+        widest = other.light_m(np.array(depths_m)).max()
+        if widest < least and farthest_off(other, device, depths_m)[0] <= most_px:
+            best, least = other, widest
+    return best
 
 
 def device_document(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from planning.model.calibration_errors import AS_PLANNED
 from planning.model.errors import InfeasibleLimitsError, InputError
+from planning.model.light.drawn_edges import DrawnEdges
 from planning.model.requirements import (
     CameraLimits,
     CheckLimits,
@@ -25,6 +26,8 @@ from .wishes import Wishes
 
 _Limits = TypeVar("_Limits", ProjectorLimits, CameraLimits, TriangulationLimits)
 
+_WARN_INCIDENCE_DEG = 70.0
+
 _UP_VECTORS = {
     **{"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)},
     **{"-x": (-1.0, 0.0, 0.0), "-y": (0.0, -1.0, 0.0), "-z": (0.0, 0.0, -1.0)},
@@ -32,9 +35,14 @@ _UP_VECTORS = {
 
 
 def build_requirements(
-    table: RigTable, wishes: Wishes, workspace: Workspace, *, tau_m: float
+    table: RigTable,
+    wishes: Wishes,
+    workspace: Workspace,
+    *,
+    tau_m: float,
+    drawn_edges: DrawnEdges,
 ) -> Requirements:
-    """Return what a plan in a workspace must reach.
+    """Return what a plan in a workspace must reach, its edges drawn like these.
 
     Raises:
         InputError: If an argument isn't usable.
@@ -54,6 +62,7 @@ def build_requirements(
         table.limits,
         calibration=table.calibration.errors(),
         accuracy_of=wishes.accuracy_of,
+        drawn_edges=drawn_edges,
     )
     if wishes.robust is not None:
         _check_drawn(table, wishes.robust)
@@ -80,6 +89,23 @@ def build_requirements(
         region_coverage=_share("region_coverage", wishes, shares, or_none=True),
         region_share=shares.region_share,
     )
+
+
+def limit_notes(limits: LimitsTable) -> tuple[str, ...]:
+    """Return what a user should know of limits, a sentence each."""
+    theta, tau = limits.projector_max_incidence_deg, limits.min_tangent_angle_deg
+    sentences: list[str] = []
+    if tau <= 90.0 - theta:
+        sentences.append(
+            f"the tangent limit of {tau:g} degrees doesn't bind: at an incidence "
+            f"of {theta:g} degrees or less the angle is {90.0 - theta:g} or more"
+        )
+    if theta > _WARN_INCIDENCE_DEG:
+        sentences.append(
+            f"projector incidence up to {theta:g} degrees: errors triple at 75, "
+            f"and at 84 only 0.6 of the surface is measured"
+        )
+    return tuple(sentences)
 
 
 def _check_drawn(table: RigTable, quantile: float) -> None:

@@ -4,11 +4,12 @@ A surface of equal code (a ring's cone or cylinder) gives one equation a pixel. 
 the viewing ray, t = |P - O|, N the surface normal, m the unit normal of the surface of
 equal code, J_r = dr/d(u, v), v = r x (N x m) and g = J_r^T v::
 
-    s_N^2 = (s_px t |g| / |r.m|)^2 + (s_R |N.r| / |r.m|)^2
+    s_N^2 = (s_px t |g| / |r.m|)^2 + (s_R |N.r| / |r.m|)^2 + (s_L |N.r| / |r.m|)^2
     s_C^2 = (s_v / |r.m|)^2 + (s_m |N.r| / |r.m|)^2
     pitch = h |N.r| / (t |g|)
 
-with s_px = s_0 / (-N.L) and h the spacing along m; s_v and s_m are what errors of the
+with s_px = s_0 / (-N.L), h the spacing along m, and s_L what blur leaves of the panel's
+pixels (`edge_terms`); s_v and s_m are what errors of the
 calibration move the viewing ray by along v, and the surface of equal code along m
 (`calibration_terms`). `formulation.md`, sections 3 and 8.
 """
@@ -32,6 +33,7 @@ from planning.scene.limits.camera_limits import (
     CameraRays,
     ViewedSamples,
 )
+from planning.scene.limits.edge_terms import edge_linearity_m
 from planning.scene.limits.limit import first_violated
 from planning.scene.limits.pair_limits import PAIR_LIMITS, PairQuality, Term
 from planning.scene.patterns import CodeSurfaces
@@ -94,17 +96,26 @@ def pair_quality(
     g = np.sqrt(gu * gu + gv * gv)
     conditioning, facing = np.abs(along), np.abs(seen.facing)
     per = 1.0 / np.maximum(conditioning, 1e-12)
+    reach = seen.distances * g
     edge = limits.noise_px / np.maximum(light.incidence_cos, 1e-9)
-    terms: dict[Term, NDArray[np.float64]] = {"edges": edge * seen.distances * g * per}
+    drawn = np.full_like(edge, limits.ring_sigma_m or 0.0)
+    terms: dict[Term, NDArray[np.float64]] = {"edges": edge * reach * per}
     if limits.ring_sigma_m is not None:
-        terms["rings"] = limits.ring_sigma_m * facing * per
-    sigma = np.hypot(terms["edges"], terms.get("rings", 0.0))
+        terms["rings"] = drawn * facing * per
+    if (blurred := limits.drawn_edges) is not None:
+        image_px_m = reach / np.maximum(facing, 1e-12)
+        squares = edge_linearity_m(
+            blurred, surfaces.depths, surfaces.pixel_m, image_px_m
+        )
+        terms["linearity"] = squares * facing * per
+        drawn = np.hypot(drawn, squares)
+    sigma = np.hypot(terms["edges"], drawn * facing * per)
     if (errors := limits.calibration) is not None:
         terms["camera"] = ray_deviation(errors, seen, v, turned) * per
         placed = surface_deviation(errors, surfaces.levers)
         terms["projector"] = placed * facing * per
-    pitch = surfaces.spacing * facing / np.maximum(seen.distances * g, 1e-15)
-    quality = PairQuality(conditioning, sigma, terms, pitch, seen, light)
+    pitch = surfaces.spacing * facing / np.maximum(reach, 1e-15)
+    quality = PairQuality(conditioning, sigma, terms, pitch, seen, light, edge, drawn)
     if errors is None or limits.accuracy_of == "noise":
         return quality
     return replace(quality, sigma=quality.total)

@@ -25,11 +25,15 @@ class CodeSurfaces(SampleArrays):
         normals: Unit normals m in the world, shape (n, 3).
         spacing: h, distance of neighbouring edges along m [m], shape (n,).
         levers: How far errors of the projector move them, `surface_levers`, (n, 3).
+        depths: z before the projector [m], shape (n,).
+        pixel_m: How wide the panel's pixels are there [m], shape (n,).
     """
 
     normals: NDArray[np.float64]
     spacing: NDArray[np.float64]
     levers: NDArray[np.float64]
+    depths: NDArray[np.float64]
+    pixel_m: NDArray[np.float64]
 
 
 class RingPattern:
@@ -62,7 +66,10 @@ class RingPattern:
         gaps = radii[index] - radii[index - 1]
         m = surface.normals @ frame[:3, :3].T
         levers = surface_levers(self.projector, points, m)
-        return CodeSurfaces(m, gaps * surface.stretch, levers)
+        pose, device = self.projector.world_from_device, self.projector.device
+        depths = (points - pose[:3, 3]) @ pose[:3, 2]
+        pixel_m = np.broadcast_to(device.pixel_m(depths), depths.shape)
+        return CodeSurfaces(m, gaps * surface.stretch, levers, depths, pixel_m)
 
     def with_border(self) -> PlannedProjector:
         """Return the projector with all that it lights beyond the last edge, too."""

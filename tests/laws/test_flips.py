@@ -22,7 +22,7 @@ from planning.report.assemble import write_plan
 from planning.rig.rig import load_rig
 from planning.scene.draws import Draw
 from planning.scene.measured import lit_samples, measured_by
-from planning.scene.patterns import CodeSurfaces, RingPattern
+from planning.scene.patterns import RingPattern
 from planning.verify.audit.audit import audit_plan
 
 RIG = """
@@ -155,7 +155,7 @@ def test_a_sign_flipped_in_the_ring_normal_is_seen(made, monkeypatch):
         rings = right(pattern, points)
         turn = pattern.projector.world_from_ring[:3, :3]
         normals = (rings.normals @ turn * [1.0, 1.0, -1.0]) @ turn.T
-        return CodeSurfaces(normals, rings.spacing, rings.levers)
+        return replace(rings, normals=normals)
 
     def measured():
         lit = lit_samples(draft.scene, plan.projectors, samples)

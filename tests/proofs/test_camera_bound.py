@@ -96,7 +96,7 @@ def everything_lit(scene, n):
         target,
         lit,
         (light,),
-        (CodeSurfaces(across, 0.01 * one, np.zeros((len(one), 3))),),
+        (CodeSurfaces(across, 0.01 * one, np.zeros((len(one), 3)), one, one),),
     )
 
 
@@ -297,7 +297,11 @@ def test_what_any_place_and_aim_measures_is_admitted(limit, value, off, name):
     spacing, cosine = rng.uniform(1e-3, 6e-3, n), rng.uniform(0.5, 1.0, n)
     light = replace(rows.lights[0], incidence_cos=cosine)
     levers = rng.uniform([0.0, 0.0, 0.0], [1.5, 0.6, 1e-3], (n, 3))
-    rows = replace(rows, lights=(light,), surfaces=(CodeSurfaces(m, spacing, levers),))
+    rows = replace(
+        rows,
+        lights=(light,),
+        surfaces=(CodeSurfaces(m, spacing, levers, m[:, 0], m[:, 0]),),
+    )
     limits = FREE | {limit: value, "calibration": off}
     required = scene_of(sphere(0.1), limits=limits).requirements
     normals = rows.target.samples.normals

@@ -9,9 +9,11 @@ from support.plain_shapes import box
 
 from planning import RequirementError, RigPlan, load_rig, plan_rig
 from planning.report.summary.coverage_lines import coverage_lines
+from planning.scene.limits.pair_limits import TERMS
 from planning.verify.audit.audit import audit_plan
 from planning.verify.audit.audit_case import AuditCase, examine
 from planning.verify.audit.audit_findings import AuditFindings
+from planning.verify.audit.counts.table_claims import audit_limits
 from planning.verify.audit.coverage.sigma_claims import audit_sigma
 
 RIG = """
@@ -75,7 +77,7 @@ def test_the_claim_is_what_the_audit_finds(plan):
 
 FIGURES = [
     *(("median_m",), ("p95_m",), ("noise_median_m",), ("noise_p95_m",)),
-    *(("terms_rms_m", term) for term in ("edges", "rings", "camera", "projector")),
+    *(("terms_rms_m", term) for term in TERMS),
 ]
 
 
@@ -106,12 +108,12 @@ def test_terms_that_the_limits_lack_or_have_beside_are_found(failures):
         del document["coverage"]["sigma"]["terms_rms_m"]["camera"]
 
     (failure,) = failures(without)
-    assert "limits: camera, edges, projector, rings" in failure
+    assert "limits: camera, edges, linearity, projector, rings" in failure
 
 
 def test_terms_add_up_and_the_limit_is_of_all(plan):
     sigma = plan.coverage.sigma
-    assert set(sigma.terms_rms_m) == {"edges", "rings", "camera", "projector"}
+    assert set(sigma.terms_rms_m) == set(TERMS)
     assert sigma.noise_median_m < sigma.median_m
     assert sigma.noise_p95_m < sigma.p95_m
     assert sigma.p95_m <= plan.requirements.triangulation.max_sigma_m
@@ -127,7 +129,7 @@ def test_no_prediction_of_what_is_measured_is_found(failures):
 def test_noise_and_calibration_are_told_apart(plan):
     sigma = plan.coverage.sigma
     alone, whole = (line for line in coverage_lines(plan) if "median" in line)
-    assert "edge noise alone" in alone
+    assert "edge noise and the panel's pixels alone" in alone
     assert f"median {1e3 * sigma.noise_median_m:.3f} mm" in alone
     assert f"median {1e3 * sigma.median_m:.3f} mm" in whole
     assert "(limit 0.3); rms by term edges" in whole
@@ -140,3 +142,14 @@ def test_noise_and_calibration_are_told_apart(plan):
         if "median" in line
     )
     assert line.endswith("(limit 0.3); the rig states no [calibration]")
+
+
+@pytest.mark.parametrize("name", ["focus_m", "aperture_m"])
+def test_another_focus_than_the_rigs_is_found(plan, case, name):
+    def change(document):
+        document["requirements"]["triangulation"]["drawn_edges"][name] *= 1.1
+
+    findings = AuditFindings()
+    audit_limits(replace(case, plan=tampered(plan, change)), findings)
+    (failure,) = findings.failures
+    assert failure.startswith(f"requirements.triangulation.drawn_edges.{name}")

@@ -4,22 +4,26 @@ import json
 import math
 import re
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from support.factories import make_rig
 from support.plain_shapes import box, joined
 
+from geometry.devices import PinholeModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import sphere
 from planning.cli.lines.object_lines import optics_lines, size_lines
 from planning.cli.main import main
 from planning.model.errors import InfeasibleLimitsError, RigError
+from planning.model.light.drawn_edges import DrawnEdges
 from planning.pipeline import plan_rig
 from planning.rig import optics
 from planning.rig.lens_fit import check_fields
 from planning.rig.object_size import ObjectSize
 from planning.rig.rig import load_rig
+from planning.rig.rig_devices import farthest_off, straighter_focus
 
 BALL = 0.13
 # The default camera: 12 mm on 3.45 um, 2048 x 1536 px, 1 px of blur, 1 m +- 50 mm.
@@ -248,3 +252,19 @@ def test_plan_lens_tells_of_a_rig_that_is_not_sharp(
     assert fit["lens"]["distance_m"] == pytest.approx(2 * 0.95 * 1.18 / 2.13, rel=1e-4)
     assert lens(monkeypatch, capsys, "--rig", rig)[0] == 2
     assert lens(monkeypatch, capsys, part, part)[0] == 2
+
+
+def test_a_focus_that_hides_the_panels_squares_is_found():
+    """Sharp on coarse pixels edges lie off; a little out of focus they don't."""
+    depths = (0.9, 1.1)
+    device = PinholeModel(np.diag([1000.0, 1000.0, 1.0]), (1000, 800), (0.3, 3.0))
+    sharp = DrawnEdges(in_focus_m=1e-4, camera_px=0.0, focus_m=1.0, aperture_m=0.02)
+    off, where = farthest_off(sharp, device, depths)
+    # 0.1 of a pixel's blur: all of the first harmonic but a fifth.
+    stairs = np.exp(-0.02 * np.pi**2) / (np.sqrt(2.0) * np.pi)
+    assert (off, where) == pytest.approx((stairs, 1.0), rel=1e-3)
+    better = straighter_focus(sharp, device, depths, 0.02)
+    assert farthest_off(better, device, depths)[0] <= 0.02
+    assert not depths[0] <= better.focus_m <= depths[1]
+    fixed = replace(sharp, focus_m=None)
+    assert straighter_focus(fixed, device, depths, 0.02) is None

@@ -193,7 +193,7 @@ def test_the_first_limit_that_fails_is_named_in_order():
         np.array([9.0, 9.0, 1e-4, 1e-4, 1e-4]),
         {},
         np.array([0.1, 0.1, 0.1, 9.0, 9.0]),
-        *(None, None),
+        *(None, None, None, None),
     )
     limits = TriangulationLimits(0.1, 0.1, max_sigma_m=1e-3, min_ring_pitch_px=6.0)
     stage = measurability.first_pair_failure(quality, limits)

@@ -36,20 +36,21 @@ class PredictedSigma(Part):
     included where the rig states it.
 
     Attributes:
-        noise_median_m: Of edge noise and misplaced rings alone, of the same pairs; None
-            in plans from before.
+        noise_median_m: Of edge noise, misplaced rings and the panel's pixels alone, of
+            the same pairs; None in plans from before.
         noise_p95_m: Likewise.
-        terms_rms_m: Root mean square of each independent term: `edges`, `rings`, and
-            of the calibration `camera` and `projector`; absent where nothing states it.
+        terms_rms_m: Root mean square of each independent term: `edges`, `rings`,
+            `linearity` of drawn edges, and of the calibration `camera` and `projector`;
+            absent where nothing states it.
     """
 
     median_m: float
     p95_m: float
     noise_median_m: float | None = None
     noise_p95_m: float | None = None
-    terms_rms_m: dict[Literal["edges", "rings", "camera", "projector"], float] = Field(
-        default={}
-    )
+    terms_rms_m: dict[
+        Literal["edges", "rings", "linearity", "camera", "projector"], float
+    ] = Field(default={})
 
 
 class Coverage(Part):

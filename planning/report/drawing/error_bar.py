@@ -10,6 +10,7 @@ from .picture_view import SUPERSAMPLING, Colour
 _COLOURS: dict[str, Colour] = {
     "edges": (120, 120, 125),
     "rings": (170, 150, 60),
+    "linearity": (90, 140, 80),
     "camera": (0, 90, 160),
     "projector": (200, 80, 0),
 }

@@ -3,7 +3,8 @@
 from planning.model.document.check_records import ReconstructionRecord
 from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
-from planning.model.words import count_words, error_words, labelled, percent
+from planning.model.requirements import CheckLimits
+from planning.model.words import count_words, labelled, percent
 
 # Sums of seconds that differ by less are the same [s].
 _EXACT = 1e-6
@@ -105,3 +106,12 @@ def cost_lines(document: PlanDocument) -> list[str]:
             won = f"saved {saved:.2f} s" if saved > _EXACT else "saved nothing"
             lines.append(f"{other:.1f} s {what}: {how} {won}")
     return labelled("COST", lines)
+
+
+def error_words(rms_m: float, p95_m: float, bias_m: float, limits: CheckLimits) -> str:
+    """Return the errors of points from the surface in mm, each with its limit."""
+    return (
+        f"rms {1e3 * rms_m:.3f} mm (limit {1e3 * limits.max_rms_m:g}), "
+        f"p95 {1e3 * p95_m:.3f} ({1e3 * limits.max_p95_m:g}), "
+        f"bias {1e3 * bias_m:+.3f} ({1e3 * limits.max_bias_m:g})"
+    )

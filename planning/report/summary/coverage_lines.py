@@ -70,18 +70,19 @@ def _sigma_lines(plan: RigPlan) -> list[str]:
     limit = limits.max_sigma_m
     at_most = "" if limit is None else f" (limit {1e3 * limit:g})"
     whole = share(sigma.median_m, sigma.p95_m)
+    panel = "" if limits.drawn_edges is None else " and the panel's pixels"
+    edges = (
+        f"predicted sigma along the normal, of {limits.noise_px:g} px edge noise"
+        f"{panel} alone"
+    )
     if limits.calibration is None:
-        return [
-            f"predicted sigma along the normal, of {limits.noise_px:g} px edge noise "
-            f"alone: {whole}{at_most}; the rig states no [calibration]"
-        ]
+        return [f"{edges}: {whole}{at_most}; the rig states no [calibration]"]
     noise = share(sigma.noise_median_m or 0.0, sigma.noise_p95_m or 0.0)
     of_noise = at_most if limits.accuracy_of == "noise" else ""
     of_all = "" if limits.accuracy_of == "noise" else at_most
     terms = ", ".join(f"{k} {1e3 * v:.3f}" for k, v in sigma.terms_rms_m.items())
     return [
-        f"predicted sigma along the normal, of {limits.noise_px:g} px edge noise "
-        f"alone: {noise}{of_noise}",
+        f"{edges}: {noise}{of_noise}",
         f"with what the calibration leaves ({_left_words(limits.calibration)}): "
         f"{whole}{of_all}; rms by term {terms} mm",
     ]

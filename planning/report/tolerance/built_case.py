@@ -43,14 +43,15 @@ class Outcome:
             deviation, -1 where none measures, shape (2, n).
         sigma: That deviation, of noise and of what a calibration leaves [m], inf where
             none measures, shape (n,).
-        incidence_cos: -N.L of that pair, shape (n,).
+        edges: Noise of that pair's edges [px], and how far its rings and their edges
+            lie off along m, rms [m], shape (2, n).
     """
 
     lit: _Mask
     measured: _Mask
     best: NDArray[np.int64]
     sigma: _Array
-    incidence_cos: _Array
+    edges: _Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +133,7 @@ class BuiltCase:
             rig.projectors, self.target.take(bright), stages[bright]
         )
         best, sigma = np.full((2, n), -1), np.full(n, np.inf)
-        cosines = np.ones(n)
+        noise = np.zeros((2, n))
         views = camera_views(scene, rig.cameras, samples.target)
         for c, seen in enumerate(views):
             for pair in pairs_of(
@@ -146,8 +147,9 @@ class BuiltCase:
                 better = total < sigma[rows]
                 rows = rows[better]
                 sigma[rows], best[:, rows] = total[better], [[pair.projector], [c]]
-                cosines[rows] = pair.quality.light.incidence_cos[better]
-        return Outcome(lit, best[0] >= 0, best, sigma, cosines)
+                found = pair.quality.edge_px, pair.quality.drawn_m
+                noise[:, rows] = np.stack(found)[:, better]
+        return Outcome(lit, best[0] >= 0, best, sigma, noise)
 
     def errors(
         self, outcome: Outcome, rig: Rig, unknown: _Array, edges: _Array
@@ -158,10 +160,9 @@ class BuiltCase:
         viewing ray passes its ring by. Unknown are (n_devices, 9) numbers of
         `drawn_rigs`; edges are normal deviates, (n, 3).
         """
-        limits = self.scene.requirements.triangulation
         samples, first = self.target.samples, len(rig.projectors)
         errors = np.full(len(self.target), np.nan)
-        noise = limits.noise_px / np.maximum(outcome.incidence_cos, 1e-9)
+        noise_px, drawn_m = outcome.edges
         for p, c in np.unique(outcome.best[:, outcome.measured], axis=1).T.tolist():
             rows = np.flatnonzero((outcome.best[0] == p) & (outcome.best[1] == c))
             points = samples.points[rows]
@@ -170,8 +171,8 @@ class BuiltCase:
                 rig.projectors[p],
                 rig.cameras[c],
                 (unknown[p], unknown[first + c]),
-                edge_px=noise[rows, None] * edges[rows, :2],
-                ring_m=(limits.ring_sigma_m or 0.0) * edges[rows, 2],
+                edge_px=noise_px[rows, None] * edges[rows, :2],
+                ring_m=drawn_m[rows] * edges[rows, 2],
             )
             moved = (there - points) * samples.normals[rows]
             errors[rows] = moved.sum(axis=1)

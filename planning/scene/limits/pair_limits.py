@@ -25,9 +25,11 @@ from .limit import (
     to_step,
 )
 
-# Of the edge's noise and of misplaced rings, s_N; of the calibration, s_C.
-Term = Literal["edges", "rings", "camera", "projector"]
+# Of the edge's noise, of misplaced rings and of the panel's pixels, s_N; of the
+# calibration, s_C.
+Term = Literal["edges", "rings", "linearity", "camera", "projector"]
 TERMS: tuple[Term, ...] = get_args(Term)
+NOISE_TERMS: tuple[Term, ...] = ("edges", "rings", "linearity")
 
 # Beyond these no limit is worth relaxing: first-order errors hold no longer.
 _LEAST_CONDITIONING = 0.03
@@ -46,6 +48,8 @@ class PairQuality:
         pitch: Distance of neighbouring rings in the image in [px], shape (n,).
         view: How the camera sees them: it stands at -t r from a sample.
         light: That falls on them: the projector stands at minus its offsets.
+        edge_px: Noise of edges in the image [px], shape (n,).
+        drawn_m: How far rings and their edges lie off along m, rms [m], shape (n,).
     """
 
     conditioning: Array
@@ -54,6 +58,8 @@ class PairQuality:
     pitch: Array
     view: ViewedSamples
     light: LightOnSamples
+    edge_px: Array
+    drawn_m: Array
 
     @property
     def total(self) -> Array:

@@ -122,6 +122,27 @@ def audit_limits(case: AuditCase, findings: AuditFindings) -> None:
     if ambient is not None:
         key, claimed = "requirements.check.ambient", case.plan.requirements.check
         findings.same(key, claimed.ambient, ambient, "rig.check.ambient", _ROUNDING)
+    _audit_focus(case.plan, findings)
+
+
+def _audit_focus(plan: RigPlan, findings: AuditFindings) -> None:
+    """Where edges are said to be sharp the rig's projector is focused, and as wide."""
+    drawn = plan.requirements.triangulation.drawn_edges
+    model = plan.document.rig.projector
+    focus, pixel_um = model.figures.focus, model.figures.pixel_um
+    if drawn is None:
+        return
+    place, pupil = None, 0.0
+    if focus is not None and pixel_um is not None and model.K is not None:
+        place = 1e-3 * focus.distance_mm
+        focal_px = math.sqrt(model.K[0][0] * model.K[1][1])
+        pupil = 1e-6 * pixel_um * focal_px / focus.f_number
+    for name, claimed, truth in (
+        ("focus_m", drawn.focus_m, place),
+        ("aperture_m", drawn.aperture_m, pupil),
+    ):
+        key = f"requirements.triangulation.drawn_edges.{name}"
+        findings.same(key, claimed, truth, "rig.projector.figures.focus", _ROUNDING)
 
 
 def audit_scales(case: AuditCase, findings: AuditFindings) -> None:

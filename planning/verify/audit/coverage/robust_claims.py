@@ -23,6 +23,7 @@ from planning.verify.audit.predicates.built_rigs import (
 from planning.verify.audit.predicates.error_terms import (
     PairGeometry,
     deviation,
+    drawn_off,
     error_terms,
 )
 from planning.verify.audit.predicates.predicates import MEASURED
@@ -180,13 +181,16 @@ def _errors(rig: BuiltRig, found: Recomputed, rng: np.random.Generator) -> Array
             rows = some[better]
             least[rows] = total[better]
             noise = limits.noise_px / pair.incidence[better]
+            rings = np.full(len(rows), limits.ring_sigma_m or 0.0)
+            if limits.drawn_edges is not None:
+                rings = np.hypot(rings, drawn_off(pair, limits.drawn_edges)[better])
             there = retriangulated(
                 found.samples.points[rows],
                 projector,
                 camera,
                 (rig.unknown[p], rig.unknown[len(rig.projectors) + c]),
                 noise[:, None] * edges[rows, :2],
-                (limits.ring_sigma_m or 0.0) * edges[rows, 2],
+                rings * edges[rows, 2],
             )
             moved = there - found.samples.points[rows]
             errors[rows] = (moved * found.samples.normals[rows]).sum(axis=1)

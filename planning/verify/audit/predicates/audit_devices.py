@@ -113,6 +113,10 @@ class DivergingRays:
         """Return what a panel twice as wide, and 1 px, shift along m [m], (n,) each."""
         return lens_shifts(self.device, local, m)
 
+    def pixel_sides(self, z: Array) -> Array:
+        """Return how wide the panel's pixels are at depths (n,) [m]."""
+        return z / np.sqrt(np.prod(np.diag(self.device.camera_matrix)[:2]))
+
 
 @dataclass(frozen=True, eq=False)
 class ParallelRays:
@@ -177,6 +181,10 @@ class ParallelRays:
         """Return what a panel twice as wide, and 1 px, shift along m [m], (n,) each."""
         per_px = self.device.pixel_pitch_m * np.hypot(m[:, 0], m[:, 1])
         return m[:, 0] * local[:, 0] + m[:, 1] * local[:, 1], per_px
+
+    def pixel_sides(self, z: Array) -> Array:
+        """Return how wide the panel's pixels are at depths (n,) [m]."""
+        return np.full(len(z), self.device.pixel_pitch_m)
 
 
 def light_from(

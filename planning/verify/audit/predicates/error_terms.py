@@ -11,13 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from geometry.arrays import Array
+from planning.model.light.drawn_edges import DrawnEdges
 from planning.model.requirements import TriangulationLimits
 from planning.verify.audit.audit_samples import AuditSamples
 
 from .audit_devices import AuditCamera, AuditProjector
 from .audit_optics import dot, in_frame, lens_shifts, pixel_gradient, towards
 
-NOISE_TERMS = ("edges", "rings")
+NOISE_TERMS = ("edges", "rings", "linearity")
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +85,10 @@ def error_terms(pair: PairGeometry, limits: TriangulationLimits) -> dict[str, Ar
         terms = {"edges": limits.noise_px / pair.incidence * pair.per_px}
         if limits.ring_sigma_m is not None:
             terms["rings"] = limits.ring_sigma_m * np.abs(pair.levers)
+        if limits.drawn_edges is not None:
+            terms["linearity"] = drawn_off(pair, limits.drawn_edges) * np.abs(
+                pair.levers
+            )
         if limits.calibration is None:
             return terms
         angle, position, focal, principal = (
@@ -105,6 +110,19 @@ def error_terms(pair: PairGeometry, limits: TriangulationLimits) -> dict[str, Ar
             )
         terms["projector"] *= np.abs(pair.levers)
     return terms
+
+
+def drawn_off(pair: PairGeometry, drawn: DrawnEdges) -> Array:
+    """Return what blur leaves of the panel's pixels, along m, rms [m], (n,)."""
+    local = in_frame(pair.projector.world_from_device, pair.points)
+    side = pair.projector.light.pixel_sides(local[:, 2])
+    across = pair.per_px / np.abs(pair.levers)
+    variance = drawn.in_focus_m**2 + (drawn.camera_px * across) ** 2
+    if drawn.focus_m is not None:
+        disc = drawn.aperture_m * np.abs(local[:, 2] - drawn.focus_m) / drawn.focus_m
+        variance = variance + (disc / 4.0) ** 2
+    stairs = np.exp(-2.0 * np.pi**2 * variance / side**2) / (np.sqrt(2.0) * np.pi)
+    return side * np.sqrt(stairs**2 + 0.005**2)
 
 
 def _image_shifts(pair: PairGeometry) -> tuple[Array, Array]:

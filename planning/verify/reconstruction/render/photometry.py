@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from planning.model.light.drawn_edges import IN_FOCUS_M, LENS_PX
 from planning.verify.reconstruction.arrays import Array, Grey, Images
 from planning.verify.reconstruction.scanner import Defocus, Scanner
 
@@ -29,8 +30,8 @@ class Photometry:
         gamma: Of the camera: a share x of full scale is reported as x^(1 / gamma).
     """
 
-    projector_blur_m: float = 0.25e-3
-    camera_blur_px: float = 0.6
+    projector_blur_m: float = IN_FOCUS_M
+    camera_blur_px: float = LENS_PX
     ambient: float = 0.05
     albedo_variation: float = 0.2
     full_well: float = 10_000.0

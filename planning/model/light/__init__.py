@@ -1,0 +1,1 @@
+"""What light does to the edges of a plan: blur, grey levels, noise. Values only."""

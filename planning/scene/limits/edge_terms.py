@@ -1,0 +1,29 @@
+"""How far ring edges lie off where they should be, however well they are found."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.model.light.drawn_edges import DrawnEdges
+from planning.model.planned import edge_linearity_px
+
+_Array = NDArray[np.float64]
+
+
+def edge_linearity_m(
+    drawn: DrawnEdges, depths: _Array, pixel_m: _Array, image_px_m: _Array
+) -> _Array:
+    """Return how far drawn edges lie off along m, rms in [m], shape (n,).
+
+    Of a panel's squares p wide at the object what the blur of light and image leaves,
+    which is b pixels wide: `edge_linearity_px`::
+
+        p linearity(b),   b = sqrt(light^2 + (camera_px k)^2) / p
+
+    Args:
+        drawn: What blurs them.
+        depths: z before the projector [m], shape (n,).
+        pixel_m: p, shape (n,).
+        image_px_m: k, what a pixel of the image is along m [m], shape (n,).
+    """
+    blur_m = np.hypot(drawn.light_m(depths), drawn.camera_px * image_px_m)
+    return pixel_m * edge_linearity_px(blur_m / pixel_m)
