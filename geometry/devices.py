@@ -7,13 +7,11 @@ questions about their field, so that callers needn't ask which one they have.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
-from .arrays import Array, Mask
-
-_Length = TypeVar("_Length", float, Array)
+from .arrays import Array, Length, Mask
 
 _UNDISTORT_STEPS = 12
 _AHEAD = np.array([0.0, 0.0, 1.0])
@@ -116,7 +114,7 @@ class PinholeModel:
         # With lens shift the image is a trapezoid across the line of sight.
         return distance * np.min(np.abs(across[:, :2] / across[:, 2:]), axis=0)
 
-    def pixel_m(self, distance: _Length) -> _Length:
+    def pixel_m(self, distance: Length) -> Length:
         """Return the side of a pixel on a surface across the axis [m]."""
         return distance / self.focal_px
 

@@ -21,6 +21,7 @@ from planning.model.errors import InfeasibleLimitsError
 from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
 from planning.projectors.candidate_set import CandidateSet, NothingLitError
+from planning.projectors.exposures import with_exposures
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import ProjectorStage, plan_projectors
 from planning.projectors.proved_projectors import prove_fewest
@@ -85,6 +86,7 @@ def placed(
     request = ready.request
     with clock.stage("projector_poses", "projector poses: widest margins"):
         projectors = widen_margins(ready.scene, stage)
+        projectors = with_exposures(ready.scene, projectors)
     with clock.stage("cameras", "cameras: candidates, measurability and cover"):
         scene = ready.scene.among(projectors)
         views = camera_candidate_views(scene, ready.camera, request.rig.n_camera_poses)
@@ -270,6 +272,7 @@ def as_they_stand(ready: Prepared, clock: Stopwatch) -> PartialPlan:
         samples = scene.target_samples(DRAWS.projectors)
         candidates = CandidateSet.over(scene, samples, poses)
         projectors = candidates.projectors[: candidates.n_existing]
+        projectors = with_exposures(scene, projectors)
         proof = unproved(candidates.cover, candidates.samples.samples.weight)
         stage = ProjectorStage(
             {len(projectors): projectors}, proof, projectors, candidates

@@ -20,7 +20,13 @@ from geometry.shapes.sample_head.sample_head import (
 from planning.model.files import write_atomically
 from planning.model.plan import RigPlan
 from planning.model.words import count_words
-from planning.rig.rig_files import Figure, list_calibrations, list_presets, preset_text
+from planning.rig.rig_files import (
+    Figure,
+    list_calibrations,
+    list_presets,
+    list_sensors,
+    preset_text,
+)
 from planning.verify.board_images.board import board_for
 from planning.verify.board_images.board_lines import (
     board_document,
@@ -94,10 +100,14 @@ def rigs_command(name: str | None) -> int:
         for role, device in preset.devices.items():
             click.echo(f"  {role}: {device}")
             _print_figures(f for f in preset.figures if f.device == role)
-    click.echo("calibrations, for `from` of [calibration] in a rig file:")
-    for calibration in list_calibrations():
-        click.echo(f"  {calibration.description}")
-        _print_figures(calibration.figures)
+    for what, listed in (
+        ("calibrations, for `from` of [calibration]", list_calibrations()),
+        ("sensors, for `sensor` of [photometry]", list_sensors()),
+    ):
+        click.echo(f"{what} in a rig file:")
+        for preset in listed:
+            click.echo(f"  {preset.description}")
+            _print_figures(preset.figures)
     return 0
 
 

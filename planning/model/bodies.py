@@ -194,3 +194,35 @@ def _triple(vector: Array) -> Triple:
 
 def _radians(degrees: float | None) -> float | None:
     return None if degrees is None else math.radians(degrees)
+
+
+@dataclass(frozen=True)
+class Existing:
+    """A device that stands already and stays where it is.
+
+    Attributes:
+        name: As in the rig file.
+        kind: `projector` or `camera`.
+        world_from_device: Its pose, rows of a 4 x 4 matrix [m].
+        body: Its own, or that of its kind; None: it has none.
+        world_from_ring: Ring frame of a projector whose rings stay, rows [m]; None:
+            its rings are planned.
+        ring_radii: Of these rings, as in `PlannedProjector`.
+
+    Raises:
+        ValueError: If a pose isn't 4 x 4.
+    """
+
+    name: str
+    kind: str
+    world_from_device: tuple[tuple[float, ...], ...]
+    body: Body | None = None
+    world_from_ring: tuple[tuple[float, ...], ...] | None = None
+    ring_radii: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        for rows in (self.world_from_device, self.world_from_ring or ((0.0,) * 4,) * 4):
+            if [len(row) for row in rows] != [4] * 4:
+                raise ValueError("existing: poses must be 4 x 4")
+        if (self.world_from_ring is None) != (not self.ring_radii):
+            raise ValueError("existing: world_from_ring and ring_radii go together")

@@ -27,6 +27,7 @@ class PlannedProjector:
         body: Its housing; None: it takes no room.
         pattern: What it shows, as in `Requirements`.
         keeps_rings: Whether its rings stay as they are.
+        exposure_s: What cameras expose each of its frames for [s]; None: not planned.
     """
 
     id: str
@@ -39,6 +40,7 @@ class PlannedProjector:
     body: Body | None = None
     pattern: Literal["rings", "dense", "none"] = "rings"
     keeps_rings: bool = False
+    exposure_s: float | None = None
 
 
 def code_bits(n_rings: int) -> int:

@@ -9,9 +9,10 @@ from dataclasses import asdict, dataclass, replace
 from math import pi
 from typing import Any, Literal
 
-from .bodies import Body, Box, Mount, Triple
+from .bodies import Box, Existing, Mount, Triple
 from .calibration_errors import PERFECT, CalibrationErrors, Robust
 from .light.drawn_edges import DrawnEdges
+from .light.light_budget import LightBudget
 
 # Of a workspace: zones and standoffs that aren't given have no key.
 _ZONES = ("box", "keep_out", "mounting")
@@ -64,6 +65,7 @@ class TriangulationLimits:
         accuracy_of: Whether `max_sigma_m` limits `noise` alone, or the `total` with
             what the calibration leaves.
         drawn_edges: What blurs the panel's pixels; None: edges lie on their rings.
+        light: What reaches the sensors; None: nobody says, and none is counted.
     """
 
     min_conditioning: float
@@ -76,6 +78,7 @@ class TriangulationLimits:
     calibration: CalibrationErrors | None = None
     accuracy_of: Literal["noise", "total"] = "total"
     drawn_edges: DrawnEdges | None = None
+    light: LightBudget | None = None
 
     @property
     def limited_calibration(self) -> CalibrationErrors:
@@ -236,38 +239,6 @@ class Workspace:
 
 
 @dataclass(frozen=True)
-class Existing:
-    """A device that stands already and stays where it is.
-
-    Attributes:
-        name: As in the rig file.
-        kind: `projector` or `camera`.
-        world_from_device: Its pose, rows of a 4 x 4 matrix [m].
-        body: Its own, or that of its kind; None: it has none.
-        world_from_ring: Ring frame of a projector whose rings stay, rows [m]; None:
-            its rings are planned.
-        ring_radii: Of these rings, as in `PlannedProjector`.
-
-    Raises:
-        ValueError: If a pose isn't 4 x 4.
-    """
-
-    name: str
-    kind: str
-    world_from_device: tuple[tuple[float, ...], ...]
-    body: Body | None = None
-    world_from_ring: tuple[tuple[float, ...], ...] | None = None
-    ring_radii: tuple[float, ...] = ()
-
-    def __post_init__(self) -> None:
-        for rows in (self.world_from_device, self.world_from_ring or ((0.0,) * 4,) * 4):
-            if [len(row) for row in rows] != [4] * 4:
-                raise ValueError("existing: poses must be 4 x 4")
-        if (self.world_from_ring is None) != (not self.ring_radii):
-            raise ValueError("existing: world_from_ring and ring_radii go together")
-
-
-@dataclass(frozen=True)
 class Requirements:
     """All that is asked of a plan.
 
@@ -315,6 +286,7 @@ class Requirements:
         tables = [
             (document["workspace"], _LEFT_OUT),
             (document, ("existing", "robust")),
+            (document["triangulation"], ("light",)),
         ]
         for table, names in devices + tables:
             for name in names:

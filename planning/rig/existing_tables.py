@@ -9,10 +9,10 @@ from pydantic import Field, model_validator
 
 from geometry.devices import DeviceModel
 from geometry.poses import turns_of
-from planning.model.bodies import Body, BodyTable
+from planning.model.bodies import Body, BodyTable, Existing
 from planning.model.device_poses import rounded_pose
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.requirements import Existing, Requirements, Workspace
+from planning.model.requirements import Requirements, Workspace
 from planning.model.table_types import Axis, Name, Table, WrittenPose, read_pose
 from planning.scene.workspace.candidates import aimed_poses
 

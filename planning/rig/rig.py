@@ -29,6 +29,7 @@ from .obstacle_tables import obstacles_of
 from .rig_devices import (
     device_document,
     drawn_edges,
+    light_budget,
     parallel_device,
     pinhole_device,
 )
@@ -195,8 +196,9 @@ class Rig:
         )
         workspace = replace(workspace, **self.mounts())
         drawn = drawn_edges(self._projector_table, projector)
+        light = light_budget(self.table, self._projector_table, camera)
         required = build_requirements(
-            self.table, wishes, workspace, tau_m=tau_m, drawn_edges=drawn
+            self.table, wishes, workspace, tau_m=tau_m, drawn_edges=drawn, light=light
         )
         devices = {
             "projector": (projector, self.projector_body()),
@@ -234,6 +236,8 @@ class Rig:
         }
         if table.mounting != MountingTable():
             listed["mounting"] = table.mounting.model_dump()
+        if table.photometry is not None:
+            listed["photometry"] = table.photometry.model_dump(exclude_none=True)
         if table.placement.clearance_mm:
             listed["clearance_m"] = table.placement.clearance_mm * 1e-3
         return {

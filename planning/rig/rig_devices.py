@@ -10,10 +10,11 @@ from geometry.devices import DeviceModel, ParallelModel, PinholeModel
 from planning.model.bodies import Body
 from planning.model.errors import RigError
 from planning.model.light.drawn_edges import DrawnEdges
+from planning.model.light.light_budget import LightBudget
 from planning.model.planned import edge_linearity_px
 
 from . import optics
-from .rig_tables import ParallelTable, PinholeTable
+from .rig_tables import ParallelTable, PinholeTable, RigTable
 
 # Projectors of the shortest throw look 60 degrees or so off their axes.
 _FARTHEST_OFF = math.radians(75.0)
@@ -79,6 +80,59 @@ def drawn_edges(table: PinholeTable | ParallelTable, device: DeviceModel) -> Dra
     return DrawnEdges(
         focus_m=1e-3 * table.focus.distance_mm,
         aperture_m=focal_m / table.focus.f_number,
+    )
+
+
+def light_budget(
+    table: RigTable, projector: PinholeTable | ParallelTable, camera: PinholeModel
+) -> LightBudget | None:
+    """Return what the rig says of light; None: nothing.
+
+    Raises:
+        RigError: If the camera's stop, pixels or exposure aren't stated.
+    """
+    light, seen = table.photometry, table.camera
+    if light is None:
+        return None
+    if seen.focus is None or seen.pixel_um is None:
+        raise RigError(
+            "[photometry] needs camera.pixel_um and [camera.focus] with its f_number: "
+            "they decide how much light a pixel gets; write them"
+        )
+    hz = projector.frame_rate_hz
+    period, longest = None if hz is None else 1.0 / hz, light.max_exposure_ms
+    if longest is None and period is not None:
+        # As stated, in whole refreshes.
+        stated = 1e-3 * (seen.exposure_ms or 0.0)
+        longest = 1e3 * max(round(stated / period), 1) * period
+    longest = longest or seen.exposure_ms
+    if longest is None:
+        raise RigError(
+            "[photometry] needs max_exposure_ms, camera.exposure_ms or the projector's "
+            "frame_rate_hz: none says how long an exposure may be"
+        )
+    if period is not None and 1e-3 * longest < period * (1.0 - 1e-9):
+        raise RigError(
+            f"[photometry] max_exposure_ms = {longest:g} is shorter than a refresh of "
+            f"the projector, {1e3 * period:.3g} ms, of which an exposure takes whole "
+            f"ones; write a longer one"
+        )
+    return LightBudget(
+        albedo=light.albedos,
+        f_number=seen.focus.f_number,
+        focal_px=camera.focal_px,
+        pixel_m=_pixel_m(seen),
+        gain=10.0 ** (light.gain_db / 20.0),
+        max_exposure_s=1e-3 * longest,
+        period_s=period,
+        **{
+            name: getattr(light, name)
+            for name in (
+                *("lumens", "contrast", "room_lux", "lumens_per_watt", "transmission"),
+                *("quantum_efficiency", "full_well_e", "read_noise_e", "bits"),
+                "min_contrast",
+            )
+        },
     )
 
 

@@ -18,11 +18,17 @@ from pydantic_core import ErrorDetails
 from geometry.files.file_content import file_content
 from planning.model.errors import RigError
 from planning.model.files import reading
+from planning.model.light.photometry_table import SensorTable
 from planning.model.table_types import SourcedTable, fault_words
 
 from .rig_tables import CalibrationTable, RigTable
 
 _DEVICES = ("projector", "parallel_projector", "camera")
+# Tables that may name a preset: by which key, and where those are.
+_PRESETS = {
+    "calibration": ("from", "calibrations"),
+    "photometry": ("sensor", "sensors"),
+}
 # Ways to say one thing: a figure laid over a base replaces the base's other ways.
 _SAME = (
     ("focal_px", "focal_mm", "throw_ratio"),
@@ -52,11 +58,20 @@ class Preset:
 
 def list_calibrations() -> tuple[Preset, ...]:
     """Return what `from` of `[calibration]` takes, each with its figures."""
-    found: list[Preset] = []
-    for name in _names("presets", "calibrations"):
-        table = CalibrationTable.model_validate(_calibration(name))
-        found.append(Preset(name, table.description, {}, _figures("", table)))
-    return tuple(found)
+    return tuple(_of_table("calibrations", CalibrationTable))
+
+
+def list_sensors() -> tuple[Preset, ...]:
+    """Return what `sensor` of `[photometry]` takes, each with its figures."""
+    return tuple(_of_table("sensors", SensorTable))
+
+
+def _of_table(
+    folder: str, kind: type[CalibrationTable] | type[SensorTable]
+) -> Iterator[Preset]:
+    for name in _names("presets", folder):
+        table = kind.model_validate(_figures_of(folder, name))
+        yield Preset(name, table.description, {}, _figures("", table))
 
 
 def list_presets() -> tuple[Preset, ...]:
@@ -90,8 +105,9 @@ def read_rig(name_or_path: str | Path) -> RigTable:
                 f"{', '.join(preset_names())}"
             )
         tables = lay_over(tomllib.loads(preset_text(base)), tables)
-    if isinstance(calibration := tables.get("calibration"), dict):
-        tables["calibration"] = _with_calibration(where, calibration)
+    for key in _PRESETS:
+        if isinstance(table := tables.get(key), dict):
+            tables[key] = _with_preset(where, key, table)
     try:
         return RigTable.model_validate(tables)
     except ValidationError as error:
@@ -115,7 +131,7 @@ def lay_over(base: dict[str, Any], tables: dict[str, Any]) -> dict[str, Any]:
         old = base.get(key)
         if not (isinstance(value, dict) and isinstance(old, dict)):
             merged[key] = value
-        elif key == "calibration":
+        elif key in _PRESETS:
             merged[key] = _lay_figures_over(old, value)
         elif key not in _DEVICES:
             merged[key] = {**old, **value}
@@ -143,7 +159,7 @@ def _lay_device_over(base: dict[str, Any], given: dict[str, Any]) -> dict[str, A
 
 def _lay_figures_over(base: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
     """Return a calibration laid over another: what it replaces has no source."""
-    if "from" in given:
+    if set(given) & {"from", "sensor"}:
         return given
     kept = {k: v for k, v in base.get("sources", {}).items() if k not in given}
     newer = given.get("sources", {})
@@ -153,21 +169,26 @@ def _lay_figures_over(base: dict[str, Any], given: dict[str, Any]) -> dict[str, 
     return {**base, **unnamed, **given, "sources": sources}
 
 
-def _with_calibration(where: str, given: dict[str, Any]) -> dict[str, Any]:
-    """Return a calibration laid over the preset that its `from` names."""
-    given = dict(given)
-    if (name := given.pop("from", None)) is None:
+def _with_preset(where: str, key: str, given: dict[str, Any]) -> dict[str, Any]:
+    """Return a table laid over the preset that it names, if it names one."""
+    given, (word, folder) = dict(given), _PRESETS[key]
+    if (name := given.pop(word, None)) is None:
         return given
-    known = _names("presets", "calibrations")
+    known = _names("presets", folder)
     if name not in known:
         raise RigError(
-            f"{where}: [calibration] from = {name!r} must be one of {', '.join(known)}"
+            f"{where}: [{key}] {word} = {name!r} must be one of {', '.join(known)}"
         )
-    return _lay_figures_over(_calibration(name), given)
+    preset = _figures_of(folder, name)
+    laid = _lay_figures_over(preset, given)
+    # A sensor's figures are a few of its table's; they keep its name.
+    if folder == "sensors" and not set(given) & set(preset):
+        laid["description"] = preset["description"]
+    return laid
 
 
-def _calibration(name: str) -> dict[str, Any]:
-    file = files("planning.rig").joinpath("presets", "calibrations", f"{name}.toml")
+def _figures_of(folder: str, name: str) -> dict[str, Any]:
+    file = files("planning.rig").joinpath("presets", folder, f"{name}.toml")
     table = tomllib.loads(file.read_text(encoding="utf-8"))
     return {**table, "description": f"{name}: {table['description']}"}
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from planning.model.calibration_errors import AS_PLANNED
 from planning.model.errors import InfeasibleLimitsError, InputError
 from planning.model.light.drawn_edges import DrawnEdges
+from planning.model.light.light_budget import LightBudget
 from planning.model.requirements import (
     CameraLimits,
     CheckLimits,
@@ -41,8 +42,9 @@ def build_requirements(
     *,
     tau_m: float,
     drawn_edges: DrawnEdges,
+    light: LightBudget | None = None,
 ) -> Requirements:
-    """Return what a plan in a workspace must reach, its edges drawn like these.
+    """Return what a plan in a workspace must reach, its edges drawn and lit so.
 
     Raises:
         InputError: If an argument isn't usable.
@@ -63,6 +65,7 @@ def build_requirements(
         calibration=table.calibration.errors(),
         accuracy_of=wishes.accuracy_of,
         drawn_edges=drawn_edges,
+        light=light,
     )
     if wishes.robust is not None:
         _check_drawn(table, wishes.robust)

@@ -5,10 +5,9 @@ means: `docs/reference/rig-files.md`.
 """
 
 import math
-from itertools import pairwise
 from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from planning.model.bodies import BodyTable, MountTable
 from planning.model.calibration_errors import (
@@ -17,6 +16,8 @@ from planning.model.calibration_errors import (
     Mounting,
 )
 from planning.model.document.device_records import RingAxis
+from planning.model.light.photometry_table import PhotometryTable
+from planning.model.light.response_table import Response
 from planning.model.table_types import (
     Acute,
     Limit,
@@ -97,27 +98,6 @@ class PinholeTable(DeviceTable):
         return self
 
 
-def _check_response(response: float | list[float] | None) -> float | list[float] | None:
-    if not isinstance(response, list):
-        return response
-    steps = [after - before for before, after in pairwise(response)]
-    if len(response) < 2 or min(steps) < 0.0 or not response[-1] > response[0]:
-        raise ValueError(
-            f"response of {len(response)} levels must be measured light from black to "
-            f"white at 2 or more evenly spaced grey levels, never falling; or write "
-            f"one number, the gamma: 1 is linear"
-        )
-    return response
-
-
-Response = Annotated[
-    Annotated[float, Field(gt=0.0, le=10.0)]
-    | Annotated[list[Annotated[float, Field(ge=0.0)]], Field(max_length=4096)]
-    | None,
-    AfterValidator(_check_response),
-]
-
-
 class ProjectorTable(PinholeTable):
     """A projector of diverging light, `[projector]`."""
 
@@ -192,7 +172,7 @@ class LimitsTable(Table):
     camera_max_incidence_deg: Acute = 70.0
     max_sample_distance_mm: Limit = None
     min_conditioning: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.1
-    noise_px: Positive = 0.1
+    noise_px: Annotated[float, Field(ge=0.0)] = 0.1
     min_ring_pitch_px: Limit = 6.0
     max_sigma_mm: Limit = 0.3
     ring_sigma_mm: Limit = None
@@ -294,6 +274,7 @@ class RigTable(Table):
     limits: LimitsTable = LimitsTable()
     calibration: CalibrationTable = CalibrationTable()
     mounting: MountingTable = MountingTable()
+    photometry: PhotometryTable | None = None
     requirements: RequirementsTable = RequirementsTable()
     check: CheckTable = CheckTable()
     existing: list[ExistingTable] = Field(default=[])
@@ -307,6 +288,15 @@ class RigTable(Table):
             raise ValueError(
                 f"placement.clearance_mm = {clearance:g} is between housings, and no "
                 f"device has one; write [camera.body] or [projector.body]"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _check_noise(self) -> Self:
+        if self.limits.noise_px == 0.0 and self.photometry is None:
+            raise ValueError(
+                "limits.noise_px = 0 leaves no noise at all; write [photometry], whose "
+                "light has its own, or a noise over 0"
             )
         return self
 

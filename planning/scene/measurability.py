@@ -8,8 +8,9 @@ equal code, J_r = dr/d(u, v), v = r x (N x m) and g = J_r^T v::
     s_C^2 = (s_v / |r.m|)^2 + (s_m |N.r| / |r.m|)^2
     pitch = h |N.r| / (t |g|)
 
-with s_px = s_0 / (-N.L), h the spacing along m, and s_L what blur leaves of the panel's
-pixels (`edge_terms`); s_v and s_m are what errors of the
+with s_px = s_0 / (-N.L), and the noise of the light beside it where the rig states that
+(`light_terms`), h the spacing along m, and s_L what blur leaves of the panel's pixels
+(`edge_terms`); s_v and s_m are what errors of the
 calibration move the viewing ray by along v, and the surface of equal code along m
 (`calibration_terms`). `formulation.md`, sections 3 and 8.
 """
@@ -21,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.rays.visibility import Visibility
+from planning.model.light.drawn_edges import DrawnEdges
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import CameraLimits, TriangulationLimits
 from planning.scene.limits.calibration_terms import ray_deviation, surface_deviation
@@ -33,7 +35,8 @@ from planning.scene.limits.camera_limits import (
     CameraRays,
     ViewedSamples,
 )
-from planning.scene.limits.edge_terms import edge_linearity_m
+from planning.scene.limits.edge_terms import edge_linearity_m, edge_width_px
+from planning.scene.limits.light_terms import GreyLevels, electrons, grey_levels
 from planning.scene.limits.limit import first_violated
 from planning.scene.limits.pair_limits import PAIR_LIMITS, PairQuality, Term
 from planning.scene.patterns import CodeSurfaces
@@ -100,25 +103,52 @@ def pair_quality(
     edge = limits.noise_px / np.maximum(light.incidence_cos, 1e-9)
     drawn = np.full_like(edge, limits.ring_sigma_m or 0.0)
     terms: dict[Term, NDArray[np.float64]] = {"edges": edge * reach * per}
+    image_px_m = reach / np.maximum(facing, 1e-12)
+    grey = _grey(light, surfaces, seen, image_px_m, limits)
+    if grey is not None:
+        terms["light"] = grey.noise_px * reach * per
+        edge = np.hypot(edge, grey.noise_px)
     if limits.ring_sigma_m is not None:
         terms["rings"] = drawn * facing * per
     if (blurred := limits.drawn_edges) is not None:
-        image_px_m = reach / np.maximum(facing, 1e-12)
         squares = edge_linearity_m(
             blurred, surfaces.depths, surfaces.pixel_m, image_px_m
         )
         terms["linearity"] = squares * facing * per
         drawn = np.hypot(drawn, squares)
-    sigma = np.hypot(terms["edges"], drawn * facing * per)
+    sigma = np.hypot(edge * reach, drawn * facing) * per
     if (errors := limits.calibration) is not None:
         terms["camera"] = ray_deviation(errors, seen, v, turned) * per
         placed = surface_deviation(errors, surfaces.levers)
         terms["projector"] = placed * facing * per
     pitch = surfaces.spacing * facing / np.maximum(reach, 1e-15)
-    quality = PairQuality(conditioning, sigma, terms, pitch, seen, light, edge, drawn)
+    quality = PairQuality(
+        *(conditioning, sigma, terms, pitch, seen, light, edge, drawn, grey)
+    )
     if errors is None or limits.accuracy_of == "noise":
         return quality
     return replace(quality, sigma=quality.total)
+
+
+def _grey(
+    light: LightOnSamples,
+    surfaces: CodeSurfaces,
+    seen: ViewedSamples,
+    image_px_m: NDArray[np.float64],
+    limits: TriangulationLimits,
+) -> GreyLevels | None:
+    """How bright samples come out in a camera's image; None: nothing says."""
+    budget = limits.light
+    if budget is None:
+        return None
+    width = edge_width_px(
+        limits.drawn_edges or DrawnEdges(),
+        *(surfaces.depths, surfaces.pixel_m, image_px_m),
+    )
+    off = np.square(seen.off_centre).sum(axis=1) / budget.focal_px**2
+    squarely = surfaces.lux_per_lm * np.maximum(light.incidence_cos, 0.0)
+    lit, dark = electrons(budget, squarely, surfaces.exposure_s)
+    return grey_levels(budget, lit, dark, 1.0 / np.sqrt(1.0 + off), width)
 
 
 def first_pair_failure(

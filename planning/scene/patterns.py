@@ -27,6 +27,8 @@ class CodeSurfaces(SampleArrays):
         levers: How far errors of the projector move them, `surface_levers`, (n, 3).
         depths: z before the projector [m], shape (n,).
         pixel_m: How wide the panel's pixels are there [m], shape (n,).
+        lux_per_lm: Illuminance across the rays of a lumen in the image [1/m^2], (n,).
+        exposure_s: What a frame is exposed for [s], shape (n,).
     """
 
     normals: NDArray[np.float64]
@@ -34,6 +36,8 @@ class CodeSurfaces(SampleArrays):
     levers: NDArray[np.float64]
     depths: NDArray[np.float64]
     pixel_m: NDArray[np.float64]
+    lux_per_lm: NDArray[np.float64]
+    exposure_s: NDArray[np.float64]
 
 
 class RingPattern:
@@ -66,10 +70,13 @@ class RingPattern:
         gaps = radii[index] - radii[index - 1]
         m = surface.normals @ frame[:3, :3].T
         levers = surface_levers(self.projector, points, m)
-        pose, device = self.projector.world_from_device, self.projector.device
-        depths = (points - pose[:3, 3]) @ pose[:3, 2]
-        pixel_m = np.broadcast_to(device.pixel_m(depths), depths.shape)
-        return CodeSurfaces(m, gaps * surface.stretch, levers, depths, pixel_m)
+        return CodeSurfaces(
+            m,
+            gaps * surface.stretch,
+            levers,
+            *panel_light(self.projector, points),
+            np.full(len(points), self.projector.exposure_s or 0.0),
+        )
 
     def with_border(self) -> PlannedProjector:
         """Return the projector with all that it lights beyond the last edge, too."""
@@ -84,6 +91,25 @@ class RingPattern:
 
     def _local(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         return transform(inverse(self.projector.world_from_ring), points)
+
+
+def panel_light(
+    projector: PlannedProjector, points: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return depths z of points (n, 3), pixels there, and the light of a lumen, (n,).
+
+    A white image is as bright all over a plane across the axis, as ANSI lumens take it:
+    with n pixels of the side p(z), 1 / (n p^2) on that plane, and that over the cosine
+    of the angle off the axis across the rays.
+    """
+    pose, device = projector.world_from_device, projector.device
+    offsets = points - pose[:3, 3]
+    depths = offsets @ pose[:3, 2]
+    pixel_m = np.broadcast_to(device.pixel_m(depths), depths.shape)
+    lux = 1.0 / (np.prod(device.resolution) * np.square(pixel_m))
+    if not isinstance(device, ParallelModel):
+        lux = lux * lengths(offsets) / np.maximum(depths, 1e-9)
+    return depths, pixel_m, lux
 
 
 def surface_levers(

@@ -23,11 +23,11 @@ from geometry.shapes.boxes import (
     lines_cross,
     triangles_touch,
 )
-from planning.model.bodies import Body
+from planning.model.bodies import Body, Existing
 from planning.model.device_poses import moved_to
 from planning.model.obstacles import Obstacle
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.model.requirements import Existing, Requirements
+from planning.model.requirements import Requirements
 
 Device = PlannedProjector | PlannedCamera
 _D = TypeVar("_D", PlannedProjector, PlannedCamera)

@@ -302,7 +302,7 @@ def test_what_rings_ask_is_what_measurability_says():
     measured = np.zeros((len(rows), 2), dtype=bool)
     for k in range(2):
         incidence = SimpleNamespace(incidence_cos=light[k, rows])
-        drawn = CodeSurfaces(ring[k, rows], spacing[k, rows], 0.0 * r, t, t)
+        drawn = CodeSurfaces(ring[k, rows], spacing[k, rows], 0.0 * r, t, t, t, t)
         quality = pair_quality(normal, incidence, drawn, view, asked)
         measured[:, k] = first_pair_failure(quality, asked) == MEASURED
         measured[:, k] &= lit[rows, k]

@@ -14,6 +14,7 @@ from geometry.poses import look_at
 from geometry.shapes.primitives import sphere
 from planning.cameras.camera_cover import camera_candidate_views, plan_cameras
 from planning.cameras.proved_cameras import bound_stage, camera_stage
+from planning.model.bodies import Existing
 from planning.model.calibration_errors import CalibrationErrors
 from planning.model.document.certificates import (
     BestArea,
@@ -25,7 +26,6 @@ from planning.model.document.certificates import (
     OneFewer,
 )
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.model.requirements import Existing
 from planning.proofs import all_poses, camera_bound
 from planning.proofs.camera_bound import DEFAULT, PROVE, bound_cameras, camera_trees
 from planning.proofs.cells import measurable_cells
@@ -96,7 +96,7 @@ def everything_lit(scene, n):
         target,
         lit,
         (light,),
-        (CodeSurfaces(across, 0.01 * one, np.zeros((len(one), 3)), one, one),),
+        (CodeSurfaces(across, 0.01 * one, np.zeros((len(one), 3)), *[one] * 4),),
     )
 
 
@@ -300,7 +300,7 @@ def test_what_any_place_and_aim_measures_is_admitted(limit, value, off, name):
     rows = replace(
         rows,
         lights=(light,),
-        surfaces=(CodeSurfaces(m, spacing, levers, m[:, 0], m[:, 0]),),
+        surfaces=(CodeSurfaces(m, spacing, levers, *[cosine] * 4),),
     )
     limits = FREE | {limit: value, "calibration": off}
     required = scene_of(sphere(0.1), limits=limits).requirements

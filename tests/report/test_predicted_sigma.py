@@ -9,12 +9,14 @@ from support.plain_shapes import box
 
 from planning import RequirementError, RigPlan, load_rig, plan_rig
 from planning.report.summary.coverage_lines import coverage_lines
+from planning.report.summary.light_lines import light_lines
 from planning.scene.limits.pair_limits import TERMS
 from planning.verify.audit.audit import audit_plan
 from planning.verify.audit.audit_case import AuditCase, examine
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.counts.table_claims import audit_limits
 from planning.verify.audit.coverage.sigma_claims import audit_sigma
+from planning.verify.audit.devices.exposure_claims import audit_exposures
 
 RIG = """
 base = "default"
@@ -30,6 +32,12 @@ angle_deg = 0.005
 position_mm = 0.01
 focal_percent = 0.005
 principal_px = 0.1
+[photometry]
+lumens = 1500.0
+albedo = [0.4, 0.6]
+room_lux = 200.0
+sensor = "imx250"
+max_exposure_ms = 80.0
 """
 
 
@@ -108,7 +116,7 @@ def test_terms_that_the_limits_lack_or_have_beside_are_found(failures):
         del document["coverage"]["sigma"]["terms_rms_m"]["camera"]
 
     (failure,) = failures(without)
-    assert "limits: camera, edges, linearity, projector, rings" in failure
+    assert "limits: camera, edges, light, linearity, projector, rings" in failure
 
 
 def test_terms_add_up_and_the_limit_is_of_all(plan):
@@ -153,3 +161,55 @@ def test_another_focus_than_the_rigs_is_found(plan, case, name):
     audit_limits(replace(case, plan=tampered(plan, change)), findings)
     (failure,) = findings.failures
     assert failure.startswith(f"requirements.triangulation.drawn_edges.{name}")
+
+
+def test_exposures_and_greys_are_planned_and_told(plan):
+    light = plan.requirements.triangulation.light
+    lines = light_lines(plan)
+    for record, line in zip(plan.document.projectors, lines[1:], strict=True):
+        exposure = record.exposure
+        n = round(60.0 * exposure.exposure_s)
+        assert n > 1
+        assert exposure.exposure_s == pytest.approx(n / 60.0)
+        grey = exposure.farthest
+        assert grey.lit[1] == pytest.approx(1.5 * grey.lit[0])
+        assert light.min_contrast < grey.lit[0] - grey.dark[0] < grey.lit[1] < 255.0
+        assert f"exposed {1e3 * n / 60.0:.1f} ms ({n} refreshes)" in line
+        assert f"{grey.lit[0]:.0f} to {grey.lit[1]:.0f} and {grey.dark[0]:.0f}" in line
+
+
+EXPOSED = ("projectors", 0, "exposure")
+LIGHT = ("requirements", "triangulation", "light")
+
+
+@pytest.mark.parametrize(
+    ("path", "change", "told"),
+    [
+        ((*EXPOSED, "exposure_s"), lambda t: 1.5 * t, "whole refreshes"),
+        ((*EXPOSED, "exposure_s"), lambda t: 2.0 * t, "at most 242"),
+        ((*EXPOSED, "exposure_s"), lambda t: 0.5 * t, "wouldn't clip it yet"),
+        ((*EXPOSED, "farthest", "lit", 0), lambda g: g + 1.0, "farthest.lit"),
+        ((*EXPOSED, "farthest", "dark", 1), lambda g: g + 1.0, "farthest.dark"),
+        ((*EXPOSED, "farthest", "distance_m"), lambda d: d - 0.05, "lie beyond"),
+        ((*EXPOSED, "most_grazing", "incidence"), lambda a: a - 0.3, "lie beyond"),
+        ((*EXPOSED, "most_grazing", "point_m", 0), lambda x: x + 0.01, "distance_m"),
+        ((*LIGHT, "lumens"), lambda x: 2.0 * x, "light.lumens"),
+        ((*LIGHT, "f_number"), lambda x: 0.5 * x, "light.f_number"),
+        ((*LIGHT, "period_s"), lambda x: 0.5 * x, "light.period_s"),
+        ((*LIGHT, "albedo", 0), lambda x: 0.5 * x, "light.albedo"),
+        ((*LIGHT, "max_exposure_s"), lambda x: 0.5 * x, "light.max_exposure_s"),
+        (LIGHT, lambda _: None, "without `rig.photometry`"),
+        (EXPOSED, lambda _: None, "there without"),
+    ],
+)
+def test_false_claims_of_light_are_found(plan, case, path, change, told):
+    def falsify(document):
+        where = document
+        for key in path[:-1]:
+            where = where[key]
+        where[path[-1]] = change(where[path[-1]])
+
+    findings = AuditFindings()
+    false = tampered(plan, falsify)
+    audit_exposures(replace(case, plan=false), findings)
+    assert any(told in failure for failure in findings.failures), findings.failures

@@ -12,10 +12,10 @@ from support.written import requirements_of
 
 from geometry.shapes.primitives import sphere
 from planning import load_rig, plan_rig
+from planning.model.bodies import Existing
 from planning.model.errors import InfeasibleLimitsError, PlanFileError, RigError
 from planning.model.plan import RequirementError, RigPlan
 from planning.model.planned import PlannedCamera
-from planning.model.requirements import Existing
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import plan_projectors
 from planning.projectors.proved_projectors import prove_fewest

@@ -24,10 +24,9 @@ from planning import load_rig
 from planning.cameras.camera_baselines import BaselineSamples
 from planning.cameras.camera_bodies import CameraInterference, resolved_cover
 from planning.cameras.camera_cover import CameraCover
-from planning.model.bodies import Body, Box
+from planning.model.bodies import Body, Box, Existing
 from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.model.requirements import Existing
 from planning.projectors.projector_poses import _Lit
 from planning.proofs.conflicts import (
     Interference,

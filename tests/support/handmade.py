@@ -38,7 +38,8 @@ SIGHT = (
     "blocked_by_obstacle",
     "sample_distance",
 )
-PAIR = ("conditioning", "sigma", "pitch")
+PAIR = ("too_dark", "clipped", "conditioning", "sigma", "pitch")
+MEASURED = len(SIGHT) + len(PAIR)
 RADIUS_M = 0.05
 UP = np.array([0.0, 1.0, 0.0])
 # Sign of a cone's normal along the axis of the rings; +1 is the error to be found.
@@ -372,7 +373,7 @@ def _evaluate(
         for projector, on in zip(projectors, lit, strict=True)
         if on
     ]
-    seen = [any(pair[j] == 10 for pair in pairs) for j in range(len(cameras))]
+    seen = [any(pair[j] == MEASURED for pair in pairs) for j in range(len(cameras))]
     margins = [
         margin(entry, p, n, steep, limits["projector"]) if on else -math.inf
         for entry, on in zip(projectors, lit, strict=True)
@@ -383,7 +384,7 @@ def _evaluate(
     else:
         cause = LIGHT[max(steps)]
     reference = _reference_light(document, surface, p, n, steep) if not any(lit) else 7
-    sight = 10 if measured or not any(lit) else 0
+    sight = MEASURED if measured or not any(lit) else 0
     if not measured and any(lit):
         sight = _reference_sight(document, surface, p, n, lit)
     any_light = {"max_incidence": math.radians(89.0), "min_tangent_angle": 0.0}
@@ -400,10 +401,10 @@ def _evaluate(
         "margins": margins,
         "server": margins.index(max(margins)) if any(lit) else None,
         "by_projectors": reference == 7,
-        "by_cameras": any(lit) and sight == 10,
+        "by_cameras": any(lit) and sight == MEASURED,
         "uncovered_by_cause": cause,
         "unreachable_by_cause": None if reference == 7 else LIGHT[reference],
-        "unmeasurable_by_cause": None if sight == 10 else (SIGHT + PAIR)[sight],
+        "unmeasurable_by_cause": None if sight == MEASURED else (SIGHT + PAIR)[sight],
         "inside": inside,
     }
 
@@ -502,7 +503,7 @@ def margin(entry: Any, p: Any, n: Any, steep: Any, limits: Any) -> float:
 
 
 def pair_steps(projector: Any, camera: Any, p: Any, n: Any, limits: Any) -> int:
-    """Limits of *seen*, then *measurable*, that a lit point passes, 10: measured."""
+    """Limits of *seen*, then *measurable*, a lit point passes, `MEASURED`: all."""
     local = _into(camera["world_from_device"], p)
     origin = [camera["world_from_device"][i][3] for i in range(3)]
     r, t = _unit([p[i] - origin[i] for i in range(3)])
@@ -520,7 +521,8 @@ def pair_steps(projector: Any, camera: Any, p: Any, n: Any, limits: Any) -> int:
     focal = math.sqrt(camera["K"][0][0] * camera["K"][1][1])
     if not local[2] / (focal * cosine) <= limits["camera"]["max_sample_distance_m"]:
         return 6
-    return 7 + _triangulation_steps(projector, camera, p, n, (r, t, u, v), limits)
+    # Light is not stated, so that nothing is too dark or clipped.
+    return 9 + _triangulation_steps(projector, camera, p, n, (r, t, u, v), limits)
 
 
 def _triangulation_steps(

@@ -39,9 +39,9 @@ class PredictedSigma(Part):
         noise_median_m: Of edge noise, misplaced rings and the panel's pixels alone, of
             the same pairs; None in plans from before.
         noise_p95_m: Likewise.
-        terms_rms_m: Root mean square of each independent term: `edges`, `rings`,
-            `linearity` of drawn edges, and of the calibration `camera` and `projector`;
-            absent where nothing states it.
+        terms_rms_m: Root mean square of each independent term: `edges`, noise of the
+            `light`, `rings`, `linearity` of drawn edges, and of the calibration
+            `camera` and `projector`; absent where nothing states it.
     """
 
     median_m: float
@@ -49,7 +49,7 @@ class PredictedSigma(Part):
     noise_median_m: float | None = None
     noise_p95_m: float | None = None
     terms_rms_m: dict[
-        Literal["edges", "rings", "linearity", "camera", "projector"], float
+        Literal["edges", "light", "rings", "linearity", "camera", "projector"], float
     ] = Field(default={})
 
 

@@ -90,6 +90,34 @@ class RingSharesRecord(Part):
     measured: tuple[float, ...]
 
 
+class GreySample(Part):
+    """How bright a sample comes out, looked at along a camera's axis.
+
+    Attributes:
+        normal: Of its face.
+        lit: Grey levels of 255 in lit rings, for the least and the largest albedo.
+        dark: Likewise in dark ones.
+    """
+
+    point_m: Vector3
+    normal: Vector3
+    distance_m: float
+    incidence: float
+    lit: Interval
+    dark: Interval
+
+
+class ExposureRecord(Part):
+    """What frames of a projector are exposed for, and how bright its samples are.
+
+    Of the target's samples that are assigned to it; None: none are.
+    """
+
+    exposure_s: float
+    farthest: GreySample | None = None
+    most_grazing: GreySample | None = None
+
+
 class ProjectorRecord(Part):
     """One of `projectors`; areas are of the target.
 
@@ -100,6 +128,7 @@ class ProjectorRecord(Part):
         lit_area_m2: Area that it lights.
         world_from_mount: Pose of its thread or flange; None: the rig doesn't say.
         rings: None: the run was cut before they were spaced.
+        exposure: Absent where the rig says nothing of light.
     """
 
     id: str
@@ -120,6 +149,7 @@ class ProjectorRecord(Part):
     name: str = ""
     rings: RingsRecord | None = None
     ring_shares: RingSharesRecord | None = None
+    exposure: ExposureRecord | None = None
 
     def planned(self) -> PlannedProjector:
         """Return the projector.
@@ -136,6 +166,7 @@ class ProjectorRecord(Part):
             np.array(self.ring_radii),
             self.name if self.existing else "",
             self.body,
+            exposure_s=None if self.exposure is None else self.exposure.exposure_s,
         )
 
     def _device(self) -> PinholeModel | ParallelModel:

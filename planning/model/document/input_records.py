@@ -153,6 +153,7 @@ class RigRecord(Part):
     existing: tuple[dict[str, Any], ...] = ()
     obstacle: tuple[dict[str, Any], ...] = ()
     mounting: dict[str, float] = Field(default={})
+    photometry: dict[str, Any] = Field(default={})
     clearance_m: float = 0.0
 
 

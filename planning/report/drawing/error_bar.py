@@ -9,7 +9,8 @@ from .picture_view import SUPERSAMPLING, Colour
 
 _COLOURS: dict[str, Colour] = {
     "edges": (120, 120, 125),
-    "rings": (170, 150, 60),
+    "light": (215, 170, 20),
+    "rings": (150, 120, 90),
     "linearity": (90, 140, 80),
     "camera": (0, 90, 160),
     "projector": (200, 80, 0),

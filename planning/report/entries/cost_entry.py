@@ -44,7 +44,10 @@ def cost_record(
         scan: Where a check was made those of `render`, `decode` and `merge` [s].
     """
     pixels = sum(prod(camera.resolution) for camera in cameras)
-    n_rings, frame_s = [len(one.ring_radii) for one in projectors], _frame_time(rig)
+    n_rings, frame_s = (
+        [len(one.ring_radii) for one in projectors],
+        _frame_time(rig, projectors),
+    )
     shown = n_frames(n_rings, len(cameras))
     t4 = sum(stages.get(name, 0.0) for name in _PROJECTOR_STAGES)
     known = CostRecord(
@@ -83,11 +86,12 @@ def cost_record(
     return known.changed(**totals)
 
 
-def _frame_time(rig: RigRecord) -> float | None:
+def _frame_time(rig: RigRecord, projectors: Sequence[ProjectorRecord]) -> float | None:
+    """Of the longest exposure: as planned, or else as the rig states it."""
     camera, projector = rig.camera.figures, rig.projector.figures
-    exposure = camera.exposure_ms
+    exposures = [one.exposure.exposure_s for one in projectors if one.exposure]
+    if camera.exposure_ms is not None and not exposures:
+        exposures = [1e-3 * camera.exposure_ms]
     return frame_time(
-        camera.frame_rate_hz,
-        projector.frame_rate_hz,
-        None if exposure is None else 1e-3 * exposure,
+        camera.frame_rate_hz, projector.frame_rate_hz, max(exposures, default=None)
     )

@@ -41,6 +41,8 @@ from planning.scene.placed_bodies import Device
 from planning.scene.scene import Scene
 from planning.scene.workspace.mount_settings import device_from_mount
 
+from .exposure_entries import exposure_records
+
 
 def device_ids(
     devices: Sequence[PlannedProjector | PlannedCamera], letter: str
@@ -77,6 +79,7 @@ def projector_records(
     scene: Scene, devices: Devices, rings: RingStage | None, claims: Claims
 ) -> tuple[ProjectorRecord, ...]:
     """Return the plan's `projectors`; no `rings` where the run was cut before them."""
+    exposed = exposure_records(scene, devices, claims)
     return tuple(
         projector_record(
             projector,
@@ -86,6 +89,7 @@ def projector_records(
             **_mounted(scene.requirements.workspace.projector_mount, projector),
             rings=None if rings is None else rings.records[p],
             ring_shares=ring_shares(scene, projector, devices.cameras),
+            **exposed[p],
         )
         for p, projector in enumerate(devices.projectors)
     )

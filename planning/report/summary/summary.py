@@ -14,6 +14,7 @@ from planning.model.words import count_words, labelled, percent
 from .check_lines import check_lines, cost_lines, unchecked
 from .coverage_lines import coverage_lines, marginal_lines
 from .device_lines import axis_name, device_lines, mount_lines
+from .light_lines import light_lines
 from .proof_lines import proof_lines
 from .ring_lines import range_lines, ring_lines
 from .robust_lines import robust_lines
@@ -40,6 +41,7 @@ def summary(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
         *warning_lines(plan),
         *proof_lines(plan),
         *coverage_lines(plan),
+        *light_lines(plan),
         *robust_lines(plan),
         *range_lines(plan.document),
         *ring_lines(plan),

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.light.drawn_edges import DrawnEdges
-from planning.model.planned import edge_linearity_px
+from planning.model.planned import EDGE_VARIANCE, edge_linearity_px
 
 _Array = NDArray[np.float64]
 
@@ -27,3 +27,15 @@ def edge_linearity_m(
     """
     blur_m = np.hypot(drawn.light_m(depths), drawn.camera_px * image_px_m)
     return pixel_m * edge_linearity_px(blur_m / pixel_m)
+
+
+def edge_width_px(
+    drawn: DrawnEdges, depths: _Array, pixel_m: _Array, image_px_m: _Array
+) -> _Array:
+    """Return the blur of drawn edges in the image, a standard deviation [px], (n,).
+
+    Blur of the light, and the ramp that an edge is drawn as, in pixels of the image;
+    with lens and pixels of the camera. Arguments are those of `edge_linearity_m`.
+    """
+    square = drawn.light_m(depths) ** 2 + EDGE_VARIANCE * pixel_m**2
+    return np.sqrt(drawn.camera_px**2 + square / image_px_m**2)

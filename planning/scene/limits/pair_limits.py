@@ -10,10 +10,12 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from planning.model.light.light_budget import SATURATED
 from planning.model.requirements import TriangulationLimits
 from planning.scene.samples import LightOnSamples
 
 from .camera_limits import CAMERA_LIMITS, ROUNDING, SEEN_CAUSES, ViewedSamples
+from .light_terms import GreyLevels
 from .limit import (
     Array,
     Limit,
@@ -25,15 +27,17 @@ from .limit import (
     to_step,
 )
 
-# Of the edge's noise, of misplaced rings and of the panel's pixels, s_N; of the
-# calibration, s_C.
-Term = Literal["edges", "rings", "linearity", "camera", "projector"]
+# Of the edge's noise, as stated and by the light, of misplaced rings and of the panel's
+# pixels, s_N; of the calibration, s_C.
+Term = Literal["edges", "light", "rings", "linearity", "camera", "projector"]
 TERMS: tuple[Term, ...] = get_args(Term)
-NOISE_TERMS: tuple[Term, ...] = ("edges", "rings", "linearity")
+NOISE_TERMS: tuple[Term, ...] = ("edges", "light", "rings", "linearity")
 
 # Beyond these no limit is worth relaxing: first-order errors hold no longer.
 _LEAST_CONDITIONING = 0.03
 _LEAST_PITCH_PX = 3.0
+# More or less light by more than this is another rig.
+_MOST_LIGHT = 30.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +54,7 @@ class PairQuality:
         light: That falls on them: the projector stands at minus its offsets.
         edge_px: Noise of edges in the image [px], shape (n,).
         drawn_m: How far rings and their edges lie off along m, rms [m], shape (n,).
+        grey: How bright they come out; None: nobody says.
     """
 
     conditioning: Array
@@ -60,6 +65,7 @@ class PairQuality:
     light: LightOnSamples
     edge_px: Array
     drawn_m: Array
+    grey: GreyLevels | None = None
 
     @property
     def total(self) -> Array:
@@ -81,6 +87,73 @@ class PairCell:
     noise: Array
     spacing: Array
     placement: Array
+
+
+class TooDark(Limit[PairQuality, PairCell, TriangulationLimits]):
+    """Lit less dark >= min_contrast, where the surface is darkest."""
+
+    name = "too_dark"
+    words = "too dark in the image"
+
+    def holds(self, view: PairQuality, rules: TriangulationLimits) -> Mask | None:
+        """Return where lit and dark can be told apart."""
+        if view.grey is None or rules.light is None:
+            return None
+        return view.grey.contrast >= rules.light.min_contrast
+
+    def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:
+        """Yield more light: of the projector, through the lens, or for longer."""
+        light = facts.required.triangulation.light
+        if light is None:
+            return
+        least, lumens, number = light.min_contrast, light.lumens, light.f_number
+        longest, step = 1e3 * light.max_exposure_s, 1e3 * (light.period_s or 0.0)
+
+        def exposed(times: float) -> float:
+            return step * np.ceil(times * longest / step) if step else times * longest
+
+        yield LimitRelaxation(
+            self.name,
+            lambda pair: _within(least / np.maximum(pair.grey.contrast, 1e-9)),
+            to_digits(3),
+            lambda times: (
+                f"photometry.lumens = {times * lumens:.4g} (now {lumens:g}), "
+                f"camera.focus.f_number = {number / times**0.5:.3g} (now {number:g}) "
+                f"or photometry.max_exposure_ms = {exposed(times):.4g} (now "
+                f"{longest:.3g})"
+            ),
+        )
+
+
+class Clipped(Limit[PairQuality, PairCell, TriangulationLimits]):
+    """Lit surface below full scale, where it is brightest."""
+
+    name = "clipped"
+    words = "too bright for the sensor"
+
+    def holds(self, view: PairQuality, rules: TriangulationLimits) -> Mask | None:
+        """Return what doesn't clip."""
+        return None if view.grey is None else view.grey.white < SATURATED
+
+    def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:
+        """Yield less light."""
+        light = facts.required.triangulation.light
+        if light is None:
+            return
+        lumens, number = light.lumens, light.f_number
+        yield LimitRelaxation(
+            self.name,
+            lambda pair: _within(pair.grey.white / SATURATED),
+            to_digits(3),
+            lambda times: (
+                f"camera.focus.f_number = {number * times**0.5:.3g} (now {number:g}) "
+                f"or photometry.lumens = {lumens / times:.4g} (now {lumens:g})"
+            ),
+        )
+
+
+def _within(times: Array) -> Array:
+    return np.where(times <= _MOST_LIGHT, times, np.inf)
 
 
 class Conditioning(Limit[PairQuality, PairCell, TriangulationLimits]):
@@ -182,7 +255,13 @@ class Pitch(Limit[PairQuality, PairCell, TriangulationLimits]):
         )
 
 
-PAIR_LIMITS: tuple[Limit[Any, Any, Any], ...] = (Conditioning(), Sigma(), Pitch())
+PAIR_LIMITS: tuple[Limit[Any, Any, Any], ...] = (
+    TooDark(),
+    Clipped(),
+    Conditioning(),
+    Sigma(),
+    Pitch(),
+)
 MEASURED_LIMITS = CAMERA_LIMITS + PAIR_LIMITS
 CAUSES = SEEN_CAUSES + causes(PAIR_LIMITS)
 MEASURED = len(CAUSES)

@@ -31,6 +31,7 @@ from planning.verify.audit.coverage.sigma_claims import audit_sigma
 from planning.verify.audit.devices.body_claims import audit_bodies, audit_clearance
 from planning.verify.audit.devices.device_claims import audit_devices, audit_existing
 from planning.verify.audit.devices.evaluation_claims import audit_evaluation
+from planning.verify.audit.devices.exposure_claims import audit_exposures
 from planning.verify.audit.devices.mount_claims import audit_mounts
 from planning.verify.audit.devices.obstacle_claims import audit_obstacles
 from planning.verify.audit.devices.workspace_claims import audit_workspace
@@ -50,6 +51,7 @@ _CLAIMS = (
     audit_bodies,
     audit_clearance,
     audit_evaluation,
+    audit_exposures,
     audit_mounts,
     audit_obstacles,
     audit_areas,

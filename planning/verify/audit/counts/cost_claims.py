@@ -66,7 +66,9 @@ def _frame_time(plan: RigPlan) -> float | None:
     )
     if not (rate and refresh and rate > 0.0 and refresh > 0.0):
         return None
-    longest = max(1.0 / rate, 1e-3 * (rig.camera.figures.exposure_ms or 0.0))
+    planned = [one.exposure_s for one in plan.projectors if one.exposure_s is not None]
+    exposed = max(planned) if planned else 1e-3 * (rig.camera.figures.exposure_ms or 0)
+    longest = max(1.0 / rate, exposed)
     refreshes = longest * refresh * (1.0 - _RELATIVE)
     return max(math.ceil(refreshes), 1) / refresh if math.isfinite(refreshes) else None
 

@@ -25,6 +25,7 @@ from planning.verify.audit.predicates.error_terms import (
     deviation,
     drawn_off,
     error_terms,
+    light_noise_px,
 )
 from planning.verify.audit.predicates.predicates import MEASURED
 from planning.verify.audit.predicates.recompute import (
@@ -180,7 +181,8 @@ def _errors(rig: BuiltRig, found: Recomputed, rng: np.random.Generator) -> Array
             better = total < least[some]
             rows = some[better]
             least[rows] = total[better]
-            noise = limits.noise_px / pair.incidence[better]
+            photons = light_noise_px(pair, limits)[better]
+            noise = np.hypot(limits.noise_px / pair.incidence[better], photons)
             rings = np.full(len(rows), limits.ring_sigma_m or 0.0)
             if limits.drawn_edges is not None:
                 rings = np.hypot(rings, drawn_off(pair, limits.drawn_edges)[better])

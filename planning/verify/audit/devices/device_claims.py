@@ -7,11 +7,12 @@ import numpy as np
 
 from geometry.arrays import Array
 from geometry.devices import PinholeModel
+from planning.model.bodies import Existing
 from planning.model.document.device_records import CameraRecord, ProjectorRecord
 from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.model.requirements import Existing, Workspace
+from planning.model.requirements import Workspace
 from planning.verify.audit.audit_case import AuditCase, DeviceKind
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.predicates.audit_optics import pixels_of

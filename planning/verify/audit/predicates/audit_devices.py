@@ -201,7 +201,8 @@ class AuditProjector:
     """A projector at a pose: the plan's, or one of the reference set.
 
     `radii` are of its rings, of a reference pose the outermost alone; `blocks` are the
-    bodies of other devices, which stand in its light.
+    bodies of other devices, which stand in its light. `exposure_s` is what its frames
+    are exposed for [s], where the plan counts light.
     """
 
     device: PinholeModel | ParallelModel
@@ -209,6 +210,7 @@ class AuditProjector:
     world_from_ring: Array
     radii: Array
     blocks: tuple[Block, ...] = ()
+    exposure_s: float | None = None
 
     @cached_property
     def light(self) -> DivergingRays | ParallelRays:
@@ -264,6 +266,7 @@ def audit_projectors(plan: RigPlan) -> tuple[AuditProjector, ...]:
             p.world_from_ring,
             p.ring_radii,
             bodies_but(plan, p),
+            p.exposure_s,
         )
         for p in plan.projectors
     )

@@ -12,13 +12,15 @@ import numpy as np
 
 from geometry.arrays import Array
 from planning.model.light.drawn_edges import DrawnEdges
+from planning.model.light.light_budget import LightBudget
 from planning.model.requirements import TriangulationLimits
 from planning.verify.audit.audit_samples import AuditSamples
 
 from .audit_devices import AuditCamera, AuditProjector
 from .audit_optics import dot, in_frame, lens_shifts, pixel_gradient, towards
+from .light_levels import LightLevels
 
-NOISE_TERMS = ("edges", "rings", "linearity")
+NOISE_TERMS = ("edges", "light", "rings", "linearity")
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +33,7 @@ class PairGeometry:
         levers: (N.r) / (m.r), what an error of a ring surface moves it by.
         per_px: What an edge that is off by 1 px does along the normal [m/px].
         incidence: -N.L.
+        normals: N.
         conditioning: |r.m|.
         pitch: Of neighbouring rings in the image [px].
     """
@@ -43,6 +46,7 @@ class PairGeometry:
     levers: Array
     per_px: Array
     incidence: Array
+    normals: Array
     conditioning: Array
     pitch: Array
 
@@ -67,10 +71,15 @@ class PairGeometry:
             pitch = gap / steepness * np.abs(levers) / (t * g)
         return cls(
             *(projector, camera, points, m, w, levers, t * g),
-            -dot(normal, light),
+            *(-dot(normal, light), normal),
             np.abs(dot(r, m)),
             pitch,
         )
+
+    def levels(self, light: LightBudget) -> LightLevels:
+        """Return how bright the samples come out in the camera."""
+        levels = LightLevels.of(light, self.projector, self.points, self.normals)
+        return levels.seen(self.camera, self.points)
 
 
 def deviation(terms: dict[str, Array], names: Iterable[str] | None = None) -> Array:
@@ -83,6 +92,8 @@ def error_terms(pair: PairGeometry, limits: TriangulationLimits) -> dict[str, Ar
     """Return independent parts of the deviation along the normal [m], (n,) each."""
     with np.errstate(divide="ignore", invalid="ignore"):
         terms = {"edges": limits.noise_px / pair.incidence * pair.per_px}
+        if limits.light is not None:
+            terms["light"] = light_noise_px(pair, limits) * pair.per_px
         if limits.ring_sigma_m is not None:
             terms["rings"] = limits.ring_sigma_m * np.abs(pair.levers)
         if limits.drawn_edges is not None:
@@ -112,17 +123,33 @@ def error_terms(pair: PairGeometry, limits: TriangulationLimits) -> dict[str, Ar
     return terms
 
 
+def light_noise_px(pair: PairGeometry, limits: TriangulationLimits) -> Array:
+    """Return the noise that photons and pixels leave to edges [px], (n,); 0: unsaid."""
+    if limits.light is None:
+        return np.zeros(len(pair.points))
+    side, blur = _blur(pair, limits.drawn_edges or DrawnEdges())
+    # An edge is drawn as a ramp of two pixels, over squares, rounded to a square.
+    ramp = side**2 * (4.0 + 1.0 + 1.0) / 12.0
+    across = pair.per_px / np.abs(pair.levers)
+    return pair.levels(limits.light).noise_px(np.sqrt(blur + ramp) / across)
+
+
 def drawn_off(pair: PairGeometry, drawn: DrawnEdges) -> Array:
     """Return what blur leaves of the panel's pixels, along m, rms [m], (n,)."""
-    local = in_frame(pair.projector.world_from_device, pair.points)
-    side = pair.projector.light.pixel_sides(local[:, 2])
+    side, variance = _blur(pair, drawn)
+    stairs = np.exp(-2.0 * np.pi**2 * variance / side**2) / (np.sqrt(2.0) * np.pi)
+    return side * np.sqrt(stairs**2 + 0.005**2)
+
+
+def _blur(pair: PairGeometry, drawn: DrawnEdges) -> tuple[Array, Array]:
+    """Return sides of the panel's pixels, and the blur's variance along m, (n,)."""
+    z = in_frame(pair.projector.world_from_device, pair.points)[:, 2]
     across = pair.per_px / np.abs(pair.levers)
     variance = drawn.in_focus_m**2 + (drawn.camera_px * across) ** 2
     if drawn.focus_m is not None:
-        disc = drawn.aperture_m * np.abs(local[:, 2] - drawn.focus_m) / drawn.focus_m
+        disc = drawn.aperture_m * np.abs(z - drawn.focus_m) / drawn.focus_m
         variance = variance + (disc / 4.0) ** 2
-    stairs = np.exp(-2.0 * np.pi**2 * variance / side**2) / (np.sqrt(2.0) * np.pi)
-    return side * np.sqrt(stairs**2 + 0.005**2)
+    return pair.projector.light.pixel_sides(z), variance
 
 
 def _image_shifts(pair: PairGeometry) -> tuple[Array, Array]:

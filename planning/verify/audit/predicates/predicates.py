@@ -39,7 +39,7 @@ SIGHT_CAUSES = (
     "blocked_by_obstacle",
     "sample_distance",
 )
-PAIR_CAUSES = ("conditioning", "sigma", "pitch")
+PAIR_CAUSES = ("too_dark", "clipped", "conditioning", "sigma", "pitch")
 LIT, SEEN = len(LIGHT_CAUSES), len(SIGHT_CAUSES)
 MEASURED = SEEN + len(PAIR_CAUSES)
 OCCLUDED = LIGHT_CAUSES.index("projector_occlusion")
@@ -118,7 +118,11 @@ def pair_steps(
     pair = PairGeometry.of(projector, camera, samples)
     names = NOISE_TERMS if limits.accuracy_of == "noise" else None
     sigma = deviation(error_terms(pair, limits), names)
+    light, every = limits.light, np.ones(len(samples), dtype=bool)
+    levels = None if light is None else pair.levels(light)
     return _passed(
+        every if levels is None else levels.contrast >= levels.light.min_contrast,
+        every if levels is None else levels.brightest < 254.5,
         pair.conditioning >= limits.min_conditioning,
         sigma <= _or(limits.max_sigma_m, np.inf),
         pair.pitch >= _or(limits.min_ring_pitch_px, -np.inf),
