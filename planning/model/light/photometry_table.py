@@ -32,7 +32,7 @@ class PhotometryTable(SensorTable):
     transmission: Annotated[float, Field(gt=0.0, le=1.0)] = 0.9
     gain_db: Annotated[float, Field(ge=0.0, le=48.0)] = 0.0
     bits: Annotated[int, Field(ge=8, le=16)] = 8
-    min_contrast: Annotated[float, Field(ge=10.0, le=200.0)] = 10.0
+    min_contrast: Annotated[float, Field(ge=10.0, le=200.0)] = 15.0
     max_exposure_ms: Annotated[float, Field(gt=0.0, le=1e6)] | None = None
 
     @property

@@ -8,6 +8,7 @@ import numpy as np
 
 from geometry.mesh.mesh import TriangleMesh
 from planning.model.calibration_errors import CalibrationErrors
+from planning.model.light.light_budget import LightBudget
 from planning.model.obstacles import Obstacle
 from planning.model.plan import RigPlan
 from planning.model.requirements import CheckLimits
@@ -121,6 +122,8 @@ class Scanner:
         covariance: What an adjustment leaves of all devices instead, (9 n, 9 n): of
             each camera, then of each projector, its turn about and displacement along
             its axes [rad], [m], its focal length as a share, its principal point [px].
+        light: What reaches the sensors; None: nobody says.
+        exposures: Ids of projectors with what their frames are exposed for [s].
     """
 
     projectors: tuple[ProjectorCalibration, ...]
@@ -137,6 +140,8 @@ class Scanner:
     digest: str = ""
     calibration: CalibrationErrors | None = None
     covariance: Array | None = None
+    light: LightBudget | None = None
+    exposures: tuple[tuple[str, float], ...] = ()
 
     @classmethod
     def of(cls, plan: RigPlan) -> Self:
@@ -171,6 +176,8 @@ class Scanner:
             plan.surface.obstacles,
             plan.digest,
             wanted.triangulation.calibration,
+            light=wanted.triangulation.light,
+            exposures=tuple((p.id, p.exposure_s or 0.0) for p in plan.projectors),
         )
 
     def pairs(self) -> Iterator[tuple[tuple[int, int], PairCalibration]]:

@@ -8,6 +8,8 @@ from planning.model.light.drawn_edges import IN_FOCUS_M, LENS_PX
 from planning.verify.reconstruction.arrays import Array, Grey, Images
 from planning.verify.reconstruction.scanner import Defocus, Scanner
 
+from .lamp import Lamp
+
 _WAVELENGTHS_M = (0.009, 0.017, 0.031)
 # Rows that are blurred at a time: what is between both passes stays in the cache.
 _STRIP = 64
@@ -28,6 +30,7 @@ class Photometry:
         exposure: Share of full scale that the brightest pixels reach.
         noisy: Whether noise is added; frames are quantised to 8 bits if so.
         gamma: Of the camera: a share x of full scale is reported as x^(1 / gamma).
+        darker_rim: Whether its lens is darker off its axis, by cos^4.
     """
 
     projector_blur_m: float = IN_FOCUS_M
@@ -39,6 +42,7 @@ class Photometry:
     exposure: float = 0.85
     noisy: bool = True
     gamma: float = 1.0
+    darker_rim: bool = False
 
     @property
     def pixel_noise(self) -> float:
@@ -118,8 +122,26 @@ class Photometry:
 
 
 def assumed_light(scanner: Scanner) -> Photometry:
-    """Return light and sensor that a plan's check assumes."""
-    return Photometry(ambient=scanner.limits.check.ambient)
+    """Return light and sensor that a plan's check assumes: as stated, if it is.
+
+    A stated albedo is that of all the surface, a range that of its texture.
+    """
+    light = scanner.light
+    if light is None:
+        return Photometry(ambient=scanner.limits.check.ambient)
+    low, high = light.albedo
+    middle = scanner.mesh.centre[None]
+    white = [
+        Lamp(light, 0.0).lux(projector, float(projector.pixel_m(middle)[0]))
+        for projector in scanner.projectors
+    ]
+    return Photometry(
+        ambient=light.room_lux / float(np.mean(white)),
+        albedo_variation=(high - low) / (high + low),
+        full_well=light.full_well_e / light.gain,
+        read_noise=light.read_noise_e * light.grey_per_electron,
+        darker_rim=True,
+    )
 
 
 def _smooth(image: Grey, taps: Grey, first: int, last: int, out: Grey) -> None:

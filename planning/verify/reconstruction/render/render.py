@@ -84,6 +84,7 @@ def render_pair(
 ) -> Frames:
     """Return the frames of one camera under one projector.
 
+    A projector whose light is known is exposed as planned, and leaks into what is dark.
     The light of others that are on at the same time (`beside`) adds up, in step: white
     with white, each bit and each camera's disc with its like. The exposure is that of
     the one projector.
@@ -99,8 +100,12 @@ def render_pair(
         _images(canvas, one, light, patterns, photometry) for one, light in every
     ]
     whites = [next(images) for images in streams]
-    gain = photometry.gain(float(np.percentile(whites[0] + ambient, 99.9)))
     white = sum(whites[1:], whites[0])
+    if shown.lamp is None:
+        gain = photometry.gain(float(np.percentile(whites[0] + ambient, 99.9)))
+    else:
+        gain = shown.lamp.gain(shown.projector, every[0][1].depth)
+        ambient += np.float32(shown.lamp.leak) * white
     kind = np.uint8 if photometry.noisy else np.float32
     stack: Images = np.empty((patterns.n_frames, *canvas.shape), dtype=kind)
     stack[0] = photometry.capture(white + ambient, (*seed, 0), gain)

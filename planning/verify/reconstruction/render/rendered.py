@@ -16,6 +16,7 @@ from planning.verify.reconstruction.decode.decode import (
 from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
 from planning.verify.reconstruction.scanner import Scanner
 
+from .lamp import Lamp
 from .occluders import obstacles_of
 from .photometry import Photometry
 from .render import render_pair
@@ -65,7 +66,9 @@ class RenderedScene:
             return None
         before = obstacles_of(self._truth, projector.id)
         focus = self._truth.projector_focus
-        return Shown(projector, design, patterns, self._caster, focus, before)
+        light, exposed = self._plan.light, dict(self._plan.exposures)
+        lamp = None if light is None else Lamp(light, exposed[design.id])
+        return Shown(projector, design, patterns, self._caster, focus, before, lamp)
 
 
 def decode_rendered(

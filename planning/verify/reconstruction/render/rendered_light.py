@@ -10,6 +10,7 @@ from planning.verify.reconstruction.calibration import ProjectorCalibration
 from planning.verify.reconstruction.patterns.ring_patterns import RingsForCamera
 from planning.verify.reconstruction.scanner import Defocus
 
+from .lamp import Lamp
 from .view import RenderedView
 
 # Standard deviation of the unit square that a pixel gathers light over.
@@ -48,6 +49,7 @@ class Shown:
         caster: Of the mesh that really stands there.
         defocus: Of the projector; None: equally sharp everywhere.
         obstacles: What stands before the mesh; None: nothing.
+        lamp: How bright it is; None: as bright as the camera likes.
     """
 
     projector: ProjectorCalibration
@@ -56,6 +58,7 @@ class Shown:
     caster: RayCaster
     defocus: Defocus | None = None
     obstacles: RayCaster | None = None
+    lamp: Lamp | None = None
 
     def light(self, seen: RenderedView, in_focus_m: float) -> RenderedLight:
         """Return its light on a view's samples, edges in focus blurred by so much."""
@@ -114,4 +117,8 @@ class Shown:
         if self.obstacles is not None:
             lit &= ~self.obstacles.occluded(*ray)
         cosine = -np.einsum("ij,ij->i", beams, seen.normals[able])
+        if self.lamp is not None:
+            # Even on a plane across the axis: across its rays light is denser.
+            cosine /= beams @ projector.axis
+            cosine /= 1.0 + self.lamp.leak
         return able[lit], cosine[lit], pixels[lit], depth[lit]

@@ -35,7 +35,7 @@ class RenderedView:
         normals: Face normals there, of the side that is seen, shape (n, 3).
         rays: Viewing directions, shape (n, 3).
         distances: From the camera [m], shape (n,).
-        albedo: Shape (n,).
+        albedo: And what the lens leaves of its light, shape (n,).
     """
 
     camera: CameraCalibration
@@ -95,6 +95,9 @@ def view(
     normals = mesh.face_normals[all_faces]
     behind = np.einsum("ij,ij->i", all_rays, normals) > 0.0
     normals[behind] *= -1.0
+    albedo = photometry.albedo(points)
+    if photometry.darker_rim:
+        albedo *= ((all_rays @ camera.axis) ** 4).astype(np.float32)
     return RenderedView(
         camera,
         (left, top),
@@ -106,7 +109,7 @@ def view(
         normals,
         all_rays,
         reach,
-        photometry.albedo(points),
+        albedo,
     )
 
 
