@@ -1,10 +1,10 @@
 """What light costs: lumens and exposure against cameras, coverage and sigma.
 
-The sample on the default rig with a stated light (albedo 0.5, 100 lux of the room, IMX265
-at f/11), at most one refresh and at most six. Printed of each plan are the
-exposures, grey levels (lit and dark) of the most grazing sample of all projectors, what
-is measured of what is lit, what is too dark, the cameras, and sigma of noise alone with
-its part by the light.
+The sample on the default rig with a stated light (albedo 0.5, 100 lux of the room, the
+preset imx250 at f/11), at most one refresh and at most six. Printed of each plan are
+the exposures, grey levels (lit and dark) of the most grazing sample of all projectors,
+what is measured of what is lit, what is too dark, the cameras, and sigma of noise alone
+with its part by the light.
 
     python -m benchmarks.pixels.light_trade
 """
@@ -17,7 +17,6 @@ from planning.model.plan import RigPlan
 
 _LUMENS = (30.0, 60.0, 250.0, 1000.0, 3800.0)
 _EXPOSURES_MS = (17.0, 100.0)
-_SENSOR = {"quantum_efficiency": 0.55, "full_well_e": 10_700.0, "read_noise_e": 2.5}
 
 
 def planned(lumens: float, exposure_ms: float) -> tuple[RigPlan, bool]:
@@ -27,7 +26,9 @@ def planned(lumens: float, exposure_ms: float) -> tuple[RigPlan, bool]:
         albedo=0.5,
         room_lux=100.0,
         max_exposure_ms=exposure_ms,
-        **_SENSOR,
+        quantum_efficiency=0.55,
+        full_well_e=10_700.0,
+        read_noise_e=2.5,
     )
     rig = load_rig("default")
     rig = replace(rig, table=rig.table.model_copy(update={"photometry": light}))
