@@ -12,10 +12,11 @@ with its part by the light.
 from dataclasses import replace
 
 from planning import RequirementError, load_mesh, load_rig, plan_rig
+from planning.model.errors import InfeasibleLimitsError
 from planning.model.light.photometry_table import PhotometryTable
 from planning.model.plan import RigPlan
 
-_LUMENS = (30.0, 60.0, 250.0, 1000.0, 3800.0)
+_LUMENS = (60.0, 250.0, 500.0, 1000.0, 3000.0)
 _EXPOSURES_MS = (17.0, 100.0)
 
 
@@ -41,7 +42,16 @@ def planned(lumens: float, exposure_ms: float) -> tuple[RigPlan, bool]:
 
 def row(lumens: float, exposure_ms: float) -> str:
     """Return a line of the table."""
-    plan, met = planned(lumens, exposure_ms)
+    try:
+        plan, met = planned(lumens, exposure_ms)
+    except InfeasibleLimitsError:
+        return (
+            f"| {lumens:g} | {exposure_ms:g} |"
+            + " |" * 4
+            + " none |"
+            + " |" * 2
+            + " no |"
+        )
     exposures = [p.exposure for p in plan.document.projectors if p.exposure]
     grazing = [e.most_grazing for e in exposures if e.most_grazing]
     lit, dark = min((g.lit[0], g.dark[0]) for g in grazing)

@@ -192,6 +192,7 @@ LIGHT = ("requirements", "triangulation", "light")
         ((*EXPOSED, "farthest", "dark", 1), lambda g: g + 1.0, "farthest.dark"),
         ((*EXPOSED, "farthest", "distance_m"), lambda d: d - 0.05, "lie beyond"),
         ((*EXPOSED, "most_grazing", "incidence"), lambda a: a - 0.3, "lie beyond"),
+        ((*EXPOSED, "brightest", "lit", 1), lambda g: 0.9 * g, "lie beyond"),
         ((*EXPOSED, "most_grazing", "point_m", 0), lambda x: x + 0.01, "distance_m"),
         ((*LIGHT, "lumens"), lambda x: 2.0 * x, "light.lumens"),
         ((*LIGHT, "f_number"), lambda x: 0.5 * x, "light.f_number"),

@@ -116,6 +116,7 @@ class ExposureRecord(Part):
     exposure_s: float
     farthest: GreySample | None = None
     most_grazing: GreySample | None = None
+    brightest: GreySample | None = None
 
 
 class ProjectorRecord(Part):

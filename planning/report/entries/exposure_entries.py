@@ -66,4 +66,5 @@ def _record(
         exposure_s=time,
         farthest=told(int(distances.argmax())),
         most_grazing=told(int(on.incidence_cos.argmin())),
+        brightest=told(int(grey[0].argmax())),
     )

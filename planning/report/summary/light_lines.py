@@ -3,7 +3,7 @@
 import math
 
 from planning.model.document.device_records import GreySample, ProjectorRecord
-from planning.model.light.light_budget import LightBudget
+from planning.model.light.light_budget import SATURATED, LightBudget
 from planning.model.plan import RigPlan
 from planning.model.words import count_words, labelled
 
@@ -31,19 +31,16 @@ def _line(record: ProjectorRecord, light: LightBudget) -> str:
     if light.period_s is not None:
         n = round(exposure.exposure_s / light.period_s)
         words += f" ({count_words(n, 'refresh')})".replace("refreshs", "refreshes")
-    for name, grey in (
-        ("farthest", exposure.farthest),
-        ("most grazing", exposure.most_grazing),
-    ):
-        if grey is not None:
-            words += f"; {name} sample, {_place(name, grey)}, {_greys(grey)}"
+    if (grey := exposure.farthest) is not None:
+        words += f"; farthest sample, {1e3 * grey.distance_m:.0f} mm, {_greys(grey)}"
+    if (grey := exposure.most_grazing) is not None:
+        angle = math.degrees(grey.incidence)
+        words += f"; most grazing, {angle:.1f} deg, {_greys(grey)}"
+    if (grey := exposure.brightest) is not None:
+        words += f"; brightest {_greys(grey)}"
+        if grey.lit[1] >= SATURATED:
+            words += ", CLIPPED: a narrower aperture or less light"
     return words
-
-
-def _place(name: str, grey: GreySample) -> str:
-    if name == "farthest":
-        return f"{1e3 * grey.distance_m:.0f} mm"
-    return f"{math.degrees(grey.incidence):.1f} deg"
 
 
 def _greys(grey: GreySample) -> str:

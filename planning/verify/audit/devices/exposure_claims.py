@@ -122,13 +122,16 @@ def _audit_extremes(
     along, _ = projector.light.to_points(points)
     away = np.linalg.norm(points - projector.world_from_device[:3, 3], axis=1)
     angles = np.arccos(-(samples.normals[chosen] * along).sum(axis=1))
+    levels = LightLevels.of(light, projector, points, samples.normals[chosen])
     for name, values, grey, claimed in (
         ("farthest", away, record.farthest, "distance_m"),
         ("most_grazing", angles, record.most_grazing, "incidence"),
+        ("brightest", levels.brightest, record.brightest, "lit"),
     ):
+        largest = -np.inf
         if grey is not None:
             _audit_grey(case, p, grey, light, below.at(name))
-        largest = -np.inf if grey is None else getattr(grey, claimed)
+            largest = np.max(getattr(grey, claimed))
         n = int((values > largest).sum())
         below.holds(
             n <= _MOST_BEYOND,
