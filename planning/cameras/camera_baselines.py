@@ -19,6 +19,7 @@ from planning.proofs.quotas import Quotas, RegionFloors
 from planning.scene.bodies.clearance import lacks_clearance
 from planning.scene.draws import DRAWS
 from planning.scene.limits.calibration_terms import surface_deviation
+from planning.scene.measurability import expected_noise_px
 from planning.scene.measured import LitSamples, lit_samples, measured_by
 from planning.scene.placed_bodies import moves_bodies
 from planning.scene.scene import Scene
@@ -59,13 +60,16 @@ class BaselineSamples:
         limits = self.scene.requirements.triangulation
         levers = np.stack([rings.levers for rings in self.lit.surfaces])
         placed = surface_deviation(limits.limited_calibration, levers)
+        away = float(np.mean(self.scene.requirements.workspace.camera_radius_m))
         return RingsOnSurface(
             np.stack([rings.normals for rings in self.lit.surfaces]),
             np.stack([rings.spacing for rings in self.lit.surfaces]),
             np.stack(
                 [
-                    limits.noise_px / np.maximum(light.incidence_cos, 1e-9)
-                    for light in self.lit.lights
+                    expected_noise_px(limits, light, rings, away)
+                    for light, rings in zip(
+                        self.lit.lights, self.lit.surfaces, strict=True
+                    )
                 ]
             ),
             self.lit.lit,

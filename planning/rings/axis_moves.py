@@ -17,6 +17,7 @@ from planning.scene.draws import DRAWS
 from planning.scene.lights import light_of
 from planning.scene.limits.calibration_terms import calibration_px, surface_deviation
 from planning.scene.limits.camera_limits import ViewedSamples
+from planning.scene.measurability import expected_noise_px
 from planning.scene.measured import (
     LitSamples,
     least_sigma,
@@ -195,7 +196,12 @@ def axis_program(
     jacobians = np.stack([view.jacobian for view in seen], axis=1)
     slopes = np.einsum("ikja,ikjl->ikal", jacobians, spread)
     errors = limits.limited_calibration
-    noise = limits.noise_px / np.maximum(samples.lights[p].incidence_cos[chosen], 1e-9)
+    noise = expected_noise_px(
+        limits,
+        samples.lights[p].take(chosen),
+        samples.surfaces[p].take(chosen),
+        float(np.mean(scene.requirements.workspace.camera_radius_m)),
+    )
     # A pixel turns a ray by |J| / sqrt 2, whatever the direction, or nearly so.
     per_px = np.maximum(np.linalg.norm(jacobians, axis=(2, 3)), 1e-12) / np.sqrt(2.0)
     turned = calibration_px(errors, distances, per_px) * distances

@@ -151,6 +151,28 @@ def _grey(
     return grey_levels(budget, lit, dark, 1.0 / np.sqrt(1.0 + off), width)
 
 
+def expected_noise_px(
+    limits: TriangulationLimits,
+    light: LightOnSamples,
+    surfaces: CodeSurfaces,
+    away_m: float,
+) -> NDArray[np.float64]:
+    """Return the noise of edges in a camera that looks squarely at samples [px], (n,).
+
+    From so far away, along its axis: for programs, which propose.
+    """
+    edge = limits.noise_px / np.maximum(light.incidence_cos, 1e-9)
+    if limits.light is None:
+        return edge
+    n = len(edge)
+    axis = ViewedSamples(
+        np.full(n, SEEN, dtype=np.int8), *np.zeros((3, n)), *np.zeros((2, n, 2))
+    )
+    image_px_m = np.full(n, away_m / limits.light.focal_px)
+    grey = _grey(light, surfaces, axis, image_px_m, limits)
+    return edge if grey is None else np.hypot(edge, grey.noise_px)
+
+
 def first_pair_failure(
     quality: PairQuality, limits: TriangulationLimits
 ) -> NDArray[np.int8]:

@@ -226,3 +226,22 @@ def test_noise_of_the_light_stands_beside_the_allowance_and_alone_where_it_is_0(
     assert quality.sigma == pytest.approx(both)
     assert quality.edge_px * plain.terms["edges"] == pytest.approx(plain.edge_px * both)
     assert quality.terms["edges"] == pytest.approx(plain.terms["edges"])
+
+
+def test_programs_expect_the_noise_that_a_camera_on_the_axis_has():
+    kind, point, normal, position = SETUPS[0]
+    source = replace(measured_from(kind, [0.05, -1.1, 0.1]), exposure_s=0.01)
+    camera = PlannedCamera("C1", look_at(np.array(position), point, UP), CAMERA)
+    target = one_sample(point, normal)
+    plain, rings, falls = pair(source, camera, target)
+    limits = replace(LIMITS, light=LIGHT)
+    quality = measurability.pair_quality(
+        target.samples.normals, falls, rings, plain.view, limits
+    )
+    # As far away as makes a pixel as large there as in this view.
+    away = LIGHT.focal_px * float((rings.spacing / quality.pitch)[0])
+    expected = measurability.expected_noise_px(limits, falls, rings, away)
+    assert expected == pytest.approx(quality.edge_px, rel=1e-6)
+    assert measurability.expected_noise_px(LIMITS, falls, rings, away) == (
+        pytest.approx(plain.edge_px)
+    )
