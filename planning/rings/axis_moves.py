@@ -177,7 +177,10 @@ def axis_program(
     samples: LitSamples,
     views: Sequence[ViewedSamples],
 ) -> AxisProgram:
-    """State the axis program of projector p."""
+    """State the axis program of projector p.
+
+    What the panel's pixels leave of each edge hardly depends on the axis: left out.
+    """
     limits, projector = scene.requirements.triangulation, projectors[p]
     pose, light = projector.world_from_device, light_of(projector.device)
     middle = pose @ light.ring_frame(np.zeros(2))
