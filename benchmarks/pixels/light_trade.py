@@ -16,7 +16,7 @@ from planning.model.errors import InfeasibleLimitsError
 from planning.model.light.photometry_table import PhotometryTable
 from planning.model.plan import RigPlan
 
-_LUMENS = (60.0, 250.0, 500.0, 1000.0, 3000.0)
+_LUMENS = (60.0, 250.0)
 _EXPOSURES_MS = (17.0, 100.0)
 
 
