@@ -25,12 +25,13 @@ from benchmarks.pixels.calibration_deciles import BestPairs
 from planning import RequirementError, load_mesh, load_rig, plan_rig
 from planning.model.calibration_errors import PERFECT
 from planning.model.plan import RigPlan
+from planning.rig.rig import Rig
 from planning.rig.rig_tables import CalibrationTable
 
-_NAMES = ("face.obj", "face_scan_james.obj", "tm_fixed_top.ply", "tm_reference.obj")
-_STATED = CalibrationTable(angle_deg=0.02, position_mm=0.05)
+NAMES = ("face.obj", "face_scan_james.obj", "tm_fixed_top.ply", "tm_reference.obj")
+STATED = CalibrationTable(angle_deg=0.02, position_mm=0.05)
 _TURN = np.radians(0.02)
-_RIGS, _SEED, _MANY = 100, 7, 20
+_RIGS, _SEED, MANY = 100, 7, 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,18 +77,24 @@ class Found:
 
     def drawn(self) -> NDArray[np.float64]:
         """Return the rms of each drawn rig [m]."""
-        rng, stated = np.random.default_rng(_SEED), _STATED.errors() or PERFECT
+        rng, stated = np.random.default_rng(_SEED), STATED.errors() or PERFECT
         rigs = [self.pairs.errors(self.plan, stated, rng) for _ in range(_RIGS)]
         return np.sqrt(np.nanmean(np.square(rigs), axis=1))
+
+
+def stated_rig(calibration: CalibrationTable) -> Rig:
+    """Return the default rig with a calibration."""
+    rig = load_rig("default")
+    table = rig.table.model_copy(update={"calibration": calibration})
+    return replace(rig, table=table)
 
 
 def planned(job: tuple, calibration: CalibrationTable) -> Found:
     """Plan a mesh with a calibration, and look at its pairs with the stated one."""
     path, options, up = job
-    table = load_rig("default").table.model_copy(update={"calibration": calibration})
-    rig = replace(load_rig("default"), table=table)
+    rig = stated_rig(calibration)
     start = time.process_time()
-    wishes = {"max_projectors": _MANY, "accuracy_mm": 0.3, "up": up, "check": False}
+    wishes = {"max_projectors": MANY, "accuracy_mm": 0.3, "up": up, "check": False}
     try:
         plan = plan_rig(load_mesh(path, **options), rig, **wishes)
     except RequirementError as error:
@@ -95,7 +102,7 @@ def planned(job: tuple, calibration: CalibrationTable) -> Found:
     seconds = time.process_time() - start
     document = plan.to_document()
     document["requirements"]["triangulation"] |= {
-        "calibration": vars(_STATED.errors()),
+        "calibration": vars(STATED.errors()),
         "accuracy_of": "noise" if calibration.errors() is None else "total",
     }
     counted = RigPlan.from_document(document, plan.surface)
@@ -110,10 +117,10 @@ def main(names: list[str]) -> None:
         f"{_RIGS} drawn rigs: median rms, rms [mm] | planned [s] |"
     )
     print("|---|---|---|---|---|---|---|---|", flush=True)
-    for job in jobs(names or list(_NAMES)):
+    for job in jobs(names or list(NAMES)):
         for said, calibration in (
             ("not stated", CalibrationTable()),
-            ("stated", _STATED),
+            ("stated", STATED),
         ):
             found = planned(job, calibration)
             angles, rigs = found.angles(), found.drawn()

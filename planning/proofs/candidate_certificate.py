@@ -172,6 +172,35 @@ def larger(stage: _S, present: Sequence[object], allowed: int | None) -> _S | No
     return replace(stage, certificate=proof)
 
 
+def counted(stage: _S, devices: tuple[Any, ...], reachable_m2: float) -> _S:
+    """Return a stage with other devices that stand, as many as its cover or more.
+
+    Of more than the cover has nothing is proved: they cover what is reachable at most.
+    """
+    before, count = stage.certificate, len(devices)
+    if count == before.count:
+        return replace(stage, by_count=dict(stage.by_count) | {count: devices})
+    kept = {n: some for n, some in stage.by_count.items() if n <= before.count}
+    rows = tuple(row for row in before.by_count if row.count <= before.count)
+    found = max((row.value_m2 for row in rows), default=0.0)
+    fewer = OneFewer(upper_bound_m2=reachable_m2)
+    if count - 1 == before.count and rows:
+        fewer = OneFewer(upper_bound_m2=rows[-1].upper_bound_m2)
+    proof = before.changed(
+        count=count,
+        status="infeasible" if before.status == "infeasible" else "feasible",
+        needed=before.needed.changed(count=max(count, before.needed.count)),
+        by_count=rows,
+        best_area=BestArea(value_m2=found, upper_bound_m2=reachable_m2),
+        one_fewer=fewer,
+    )
+    if before.continuous is not None:
+        # It bounded one fewer than before.
+        unknown = before.continuous.changed(one_fewer_upper_bound_m2=None)
+        proof = proof.changed(continuous=unknown)
+    return replace(stage, by_count=kept | {count: devices}, certificate=proof)
+
+
 def unsought(cover: CandidateCover) -> Selection:
     """The existing devices as a selection that nothing was proved of."""
     chosen = np.arange(cover.n_existing)

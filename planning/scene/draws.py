@@ -42,6 +42,7 @@ class Draws:
     cameras: Draw = Draw(2000, 200)
     fresh_cameras: Draw = Draw(4000, 200)
     axes: Draw = Draw(4000, 250)
+    surer: Draw = Draw(4000, 270)
     baselines: Draw = Draw(6000, 300)
     confirming_baselines: Draw = Draw(16_000, 301)
     rings: Draw = Draw(6000, 400)

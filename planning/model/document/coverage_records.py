@@ -92,9 +92,10 @@ class RobustRecord(Part):
         n_drawn: Rigs drawn.
         n_met: Of them, those that meet it.
         least: So many make it as good as sure that the quantile of all rigs does.
-        rounds: How often requirements were tightened.
+        rounds: How often the plan was mended for it.
         n_projectors_without: Projectors of the plan for exact rigs; likewise below.
         n_met_without: Of as many of its rigs, those that meet it.
+        missed_by: How many of the rigs miss which figure; `missed_by_without` likewise.
     """
 
     n_drawn: int
@@ -104,6 +105,8 @@ class RobustRecord(Part):
     n_projectors_without: int
     n_cameras_without: int
     n_met_without: int
+    missed_by: dict[str, int] = Field(default_factory=dict)
+    missed_by_without: dict[str, int] = Field(default_factory=dict)
 
 
 class RegionCoverage(Part):

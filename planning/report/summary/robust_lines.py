@@ -3,6 +3,7 @@
 from planning.model.calibration_errors import PERFECT
 from planning.model.plan import RigPlan
 from planning.model.words import count_words, labelled, percent
+from planning.report.tolerance.asked import FIGURES
 from planning.report.tolerance.tolerance_lines import (
     calibration_words,
     mounting_words,
@@ -15,6 +16,10 @@ def robust_lines(plan: RigPlan) -> list[str]:
     if found is None or robust is None:
         return []
     required, limits = plan.requirements, plan.requirements.triangulation
+    missed, missed_without = (
+        "".join(f"; {n} miss {FIGURES[name]}" for name, n in counts.items())
+        for counts in (found.missed_by, found.missed_by_without)
+    )
     tighter = [
         f"{name} {now:.4g} instead of {before:.4g}{unit}"
         for name, now, before, unit in (
@@ -31,12 +36,6 @@ def robust_lines(plan: RigPlan) -> list[str]:
                 100 * robust.region_coverage,
                 " %",
             ),
-            (
-                "sigma",
-                1e3 * (limits.max_sigma_m or 0.0),
-                1e3 * (robust.max_sigma_m or 0.0),
-                " mm",
-            ),
         )
         if now != before
     ]
@@ -51,14 +50,15 @@ def robust_lines(plan: RigPlan) -> list[str]:
     lines = [
         f"{found.n_met} of {found.n_drawn} drawn rigs meet what is asked, "
         f"{percent(robust.quantile)} must ({found.least} of them make that as good as "
-        f"sure)",
+        f"sure){missed}",
         f"mounted within {mounting_words(robust.mounting)}; calibration leaves "
         f"{calibration_words(limits.calibration or PERFECT)}",
     ]
     if tighter:
-        lines += [
-            f"planned for {', '.join(tighter)}",
+        lines.append(f"planned for {', '.join(tighter)}")
+    if found.rounds:
+        lines.append(
             f"costs {' and '.join(more) or 'no device more'}; without it "
-            f"{found.n_met_without} of {found.n_drawn} rigs met it",
-        ]
+            f"{found.n_met_without} of {found.n_drawn} rigs met it{missed_without}"
+        )
     return labelled("ROBUST", lines)

@@ -12,6 +12,15 @@ from planning.model.requirements import Requirements
 
 # Equal up to rounding is enough.
 _SLACK = 1e-9
+# What is told of a drawn rig.
+FIGURES = {
+    "lit": "lit / reachable by projectors",
+    "coverage": "measured / reachable by cameras",
+    "worst_region": "least of both over the large regions",
+    "completeness": "of what the plan measures, within tau",
+    "rms_m": "error along the normal, rms [mm]",
+    "p95_m": "error along the normal, 95 % within [mm]",
+}
 
 
 @dataclass(frozen=True)

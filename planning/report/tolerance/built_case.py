@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.calibration_errors import (
+    AS_PLANNED,
     PERFECT,
     CalibrationErrors,
     Mounting,
@@ -197,8 +198,10 @@ class BuiltCase:
 
     def drawn(self, mounting: Mounting, deviates: Deviates) -> Figures:
         """Return what a drawn rig reaches."""
-        rig = self.rig.moved(deviates.mounted * bounds_of(mounting))
-        outcome = self.outcome(rig)
+        rig, outcome = self.rig, self.planned
+        if mounting != AS_PLANNED:
+            rig = rig.moved(deviates.mounted * bounds_of(mounting))
+            outcome = self.outcome(rig)
         unknown = deviates.unknown * deviations_of(self.calibration)
         errors = self.errors(outcome, rig, unknown, deviates.edges)
         return self.figures(outcome, errors)

@@ -1,30 +1,39 @@
-"""Plans that enough drawn rigs meet: requirements grow until a quantile holds.
+"""Plans that enough drawn rigs meet, with what that takes.
 
 A plan is made for what is asked. Then rigs are drawn (`drawn_rigs`), and where too few
-meet it, what they miss is asked for tighter, by as much as the quantile of these rigs
-is short: the required shares by the difference, the accuracy by the ratio. The plan is
-made again, in counted rounds. Enough meet it when fewer would be likely (1 - 5 %) only
-if less than the quantile of all rigs did.
+meet it, what they miss is mended and other rigs are drawn, in counted rounds:
+
+- Errors, and what cameras measure: cameras are exchanged or added (`surer_cameras`)
+  until the quantile of errors that first order predicts is below the accuracy, by as
+  much as drawn ones exceed the prediction.
+- What projectors light, and single regions: these shares are required by the difference
+  tighter, and the plan is made again.
+
+Enough meet it when fewer would be likely (1 - 5 %) only if less than the quantile of
+all rigs did.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from scipy.stats import binom
 
+from planning.cameras.surer_cameras import Aim
 from planning.model.calibration_errors import PERFECT, Robust
 from planning.model.document.coverage_records import RobustRecord
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.plan import InterruptedPlanError, RigPlan
 from planning.model.progress import TIME_IS_UP, Stopwatch
 from planning.model.requirements import Requirements
+from planning.report.assemble import write_plan
 from planning.report.partial_plan import PartialPlan, PlanRequest
 from planning.rig.wishes import Wishes
 
-from .asked import Asked, Figures
+from .asked import FIGURES, Asked, Figures
 from .built_case import BuiltCase
 from .drawn_rigs import PLANNING
 from .studies import Question
+from .surer_plan import surer
 from .tolerance import draw
 
 Keep = Callable[[RigPlan], None]
@@ -35,8 +44,9 @@ _RIGS = 400
 # How unlikely it must be that as many rigs meet what less than the quantile meets.
 _DOUBT = 0.05
 _ROUNDS = 5
-# What is asked beyond what the drawn rigs lack: of a share, and of the accuracy.
-_SHARE_SPARE, _SIGMA_SPARE = 0.0005, 0.005
+# What is asked beyond what drawn rigs lack: of a share, of the accuracy, and of this
+# where points miss tau.
+_SHARE_SPARE, _RMS_SPARE, _TAU_SPARE = 0.0005, 0.005, 0.05
 # No share that is asked for is larger.
 _LARGEST = 0.999
 
@@ -49,6 +59,7 @@ class _Round:
     partial: PartialPlan
     rigs: tuple[Figures, ...]
     n_met: int
+    missed_by: dict[str, int]
 
 
 def least_met(quantile: float, n: int) -> int:
@@ -67,21 +78,37 @@ def robustly(planned: Planned) -> Planned:
         request: PlanRequest, clock: Stopwatch, keep: Keep | None
     ) -> tuple[RigPlan, PartialPlan]:
         plan, partial = planned(request, clock, keep)
-        if request.wishes.robust is None or plan.document.truncated:
+        quantile = request.wishes.robust
+        if quantile is None or plan.document.truncated:
             return plan, partial
-        latest, asked = (plan, partial), plan.requirements
+        if keep is not None:
+            # What there is if the process ends while rigs are drawn.
+            keep(_cut(plan))
+        robust = _robust(request, plan.requirements)
+        rms = Asked.of(plan.requirements).rms_m
+        # Rigs that vary as predicted leave no more than this to chance.
+        latest, aim = (plan, partial), Aim(least_met(quantile, _RIGS) / _RIGS, rms, rms)
         rounds: list[_Round] = []
         try:
             while True:
-                rounds.append(_drawn(*latest, _robust(request, asked), clock))
-                wishes = _tightened(rounds[-1], request.wishes, asked)
-                if wishes is None or len(rounds) > _ROUNDS:
+                rounds.append(_drawn(*latest, robust, clock, len(rounds)))
+                short = _short(rounds[-1], quantile)
+                if not short or len(rounds) > _ROUNDS:
                     break
-                request = replace(request, wishes=wishes)
-                latest = planned(request, clock, keep)
-                if latest[0].document.truncated:
-                    # The one before is whole, and better known.
-                    return _cut(rounds[-1].plan), rounds[-1].partial
+                wishes = _tightened(rounds[-1], short, request.wishes)
+                aim = _aimed(aim, short, rounds[-1], aimed=len(rounds) > 1)
+                partial = latest[1]
+                if wishes != request.wishes:
+                    request = replace(request, wishes=wishes)
+                    latest = planned(request, clock, keep)
+                    if latest[0].document.truncated:
+                        # The one before is whole, and better known.
+                        return _cut(rounds[-1].plan), rounds[-1].partial
+                    partial = latest[1]
+                if (more := surer(partial, aim, clock)) is not None:
+                    latest = write_plan(more, clock), more
+                elif wishes == rounds[-1].partial.request.wishes:
+                    break
         except InfeasibleLimitsError as error:
             clock.say(f"  nothing tighter can be planned: {error}")
         except KeyboardInterrupt:
@@ -89,7 +116,7 @@ def robustly(planned: Planned) -> Planned:
         except TIME_IS_UP:
             clock.extend()
             return _cut(latest[0]), latest[1]
-        return _recorded(rounds, _robust(request, asked))
+        return _recorded(rounds, robust)
 
     return made
 
@@ -115,60 +142,73 @@ def _with(plan: RigPlan, robust: Robust) -> RigPlan:
 
 
 def _drawn(
-    plan: RigPlan, partial: PartialPlan, robust: Robust, clock: Stopwatch
+    plan: RigPlan, partial: PartialPlan, robust: Robust, clock: Stopwatch, index: int
 ) -> _Round:
-    """Hold drawn rigs against what is asked."""
+    """Hold drawn rigs against what is asked: other ones than any plan was made for."""
     plan, threads = _with(plan, robust), partial.request.threads
     errors = plan.requirements.triangulation.calibration or PERFECT
     question = Question("", robust.mounting, errors, plan.document.seed)
     asked = Asked.of(plan.requirements)
     with clock.stage("robust", "rigs that aren't built exactly as planned"):
         case = BuiltCase.of(plan, threads=threads).shared()
-        rigs = draw(case, question, range(_RIGS), threads=threads, stream=PLANNING)
+        some = range(index * _RIGS, (index + 1) * _RIGS)
+        rigs = draw(case, question, some, threads=threads, stream=PLANNING)
+        missed = [name for rig in rigs for name in asked.missed(rig)]
+        counts = {name: missed.count(name) for name in dict.fromkeys(missed)}
         n_met = sum(not asked.missed(rig) for rig in rigs)
-        clock.say(f"  {n_met} of {len(rigs)} drawn rigs meet what is asked")
-    return _Round(plan, partial, tuple(rigs), n_met)
+        clock.say(
+            f"  {n_met} of {len(rigs)} drawn rigs meet what is asked"
+            + "".join(f"; {n} miss {FIGURES[name]}" for name, n in counts.items())
+        )
+    return _Round(plan, partial, tuple(rigs), n_met, counts)
 
 
-def _tightened(drawn: _Round, wishes: Wishes, asked: Requirements) -> Wishes | None:
-    """Return wishes for what too many rigs miss; None: enough meet it, or it is in
-    vain.
-    """  # noqa: D205 - as short as it gets
-    spare = _RIGS - least_met(wishes.robust or 0.0, _RIGS)
-    if _RIGS - drawn.n_met <= spare:
-        return None
-    goals, required = Asked.of(drawn.plan.requirements), drawn.plan.requirements
-    short = _short(drawn.rigs, goals, spare)
-    changes: dict[str, float] = {}
-    for name, key, now in (
-        ("lit", "dominant_coverage", required.dominant_coverage),
-        ("coverage", "coverage", required.coverage),
-        ("worst_region", "region_coverage", required.region_coverage),
-    ):
-        if name in short:
-            lacking = getattr(goals, name) - short[name] + _SHARE_SPARE
-            changes[key] = min(now + lacking, _LARGEST)
-    sigma, rms = required.triangulation.max_sigma_m, short.get("rms_m")
-    if rms is not None and sigma is not None and goals.rms_m is not None:
-        changes["accuracy_mm"] = 1e3 * sigma * goals.rms_m / rms * (1.0 - _SIGMA_SPARE)
-    return replace(wishes, **changes) if changes else None
-
-
-def _short(rigs: Sequence[Figures], asked: Asked, spare: int) -> dict[str, float]:
-    """Return of each figure that more than so many rigs miss what all but these reach.
+def _short(drawn: _Round, quantile: float) -> dict[str, float]:
+    """Return of each figure that too many rigs miss what all but these reach.
 
     Several figures share what is to spare: each may be missed by other rigs.
     """
-    missed = [name for rig in rigs for name in asked.missed(rig)]
-    names = list(dict.fromkeys(missed))
-    each = spare // max(len(names), 1)
+    spare = _RIGS - least_met(quantile, _RIGS)
+    if _RIGS - drawn.n_met <= spare:
+        return {}
+    each = spare // max(len(drawn.missed_by), 1)
     found: dict[str, float] = {}
-    for name in names:
-        if missed.count(name) <= each:
-            continue
-        values = sorted(getattr(rig, name) or 0.0 for rig in rigs)
-        found[name] = values[-1 - each] if name == "rms_m" else values[each]
+    for name, count in drawn.missed_by.items():
+        if count > each:
+            values = sorted(getattr(rig, name) or 0.0 for rig in drawn.rigs)
+            found[name] = values[-1 - each] if name == "rms_m" else values[each]
     return found
+
+
+def _tightened(drawn: _Round, short: Mapping[str, float], wishes: Wishes) -> Wishes:
+    """Return wishes for shares that other projectors or cameras have to reach."""
+    goals, required = Asked.of(drawn.plan.requirements), drawn.plan.requirements
+    changes: dict[str, float] = {}
+    for name, key in (
+        ("lit", "dominant_coverage"),
+        ("worst_region", "region_coverage"),
+    ):
+        if name in short:
+            lacking = getattr(goals, name) - short[name] + _SHARE_SPARE
+            changes[key] = min(getattr(required, key) + lacking, _LARGEST)
+    return replace(wishes, **changes)
+
+
+def _aimed(aim: Aim, short: Mapping[str, float], drawn: _Round, *, aimed: bool) -> Aim:
+    """Return what cameras are to reach, by what the drawn rigs lack.
+
+    Drawn errors correct the aim where the cameras were `aimed` at one.
+    """
+    goals, rms = Asked.of(drawn.plan.requirements), aim.rms_m
+    if rms is not None and goals.rms_m is not None:
+        if "rms_m" in short and aimed:
+            rms *= goals.rms_m / short["rms_m"] * (1.0 - _RMS_SPARE)
+        if "completeness" in short:
+            rms *= 1.0 - _TAU_SPARE
+    more = aim.more
+    if "coverage" in short:
+        more += goals.coverage - short["coverage"] + _SHARE_SPARE
+    return replace(aim, rms_m=rms, more=more)
 
 
 def _recorded(rounds: Sequence[_Round], robust: Robust) -> tuple[RigPlan, PartialPlan]:
@@ -183,6 +223,8 @@ def _recorded(rounds: Sequence[_Round], robust: Robust) -> tuple[RigPlan, Partia
         n_projectors_without=len(first.plan.projectors),
         n_cameras_without=len(first.plan.cameras),
         n_met_without=first.n_met,
+        missed_by=best.missed_by,
+        missed_by_without=first.missed_by,
     )
     document = best.plan.document.changed(robust=record)
     return RigPlan(document, best.plan.surface), best.partial

@@ -6,17 +6,10 @@ from math import degrees
 from planning.model.calibration_errors import CalibrationErrors, Mounting
 from planning.model.words import count_words, labelled, percent
 
+from .asked import FIGURES
 from .sensitivities import DIRECTIONS, UNIT_WORDS, Sensitivity
 from .tolerance import TOLD, Tolerance
 
-_WORDS = {
-    "lit": "lit / reachable by projectors",
-    "coverage": "measured / reachable by cameras",
-    "worst_region": "least of both over the large regions",
-    "completeness": "of what the plan measures, within tau",
-    "rms_m": "error along the normal, rms [mm]",
-    "p95_m": "error along the normal, 95 % within [mm]",
-}
 _ERRORS = ("rms_m", "p95_m")
 # So many devices and directions are told, of either kind of harm.
 _MOST = 6
@@ -77,7 +70,7 @@ def _table(found: Tolerance) -> Iterator[str]:
         sign = "<=" if name in _ERRORS else ">="
         cells.append("" if asked is None else f"{sign} {_cell(name, asked).strip()}")
         yield (
-            f"{_WORDS[name]:>41}"
+            f"{FIGURES[name]:>41}"
             + "".join(f"{cell:>12}" for cell in cells[:-1])
             + (f"{cells[-1]:>12}")
         )
@@ -101,7 +94,7 @@ def _met(found: Tolerance) -> Iterator[str]:
         f"{'enough' if found.passed else 'NOT ENOUGH'}"
     )
     if missed := found.missing():
-        parts = [f"{_WORDS[name]} in {count}" for name, count in missed.items()]
+        parts = [f"{FIGURES[name]} in {count}" for name, count in missed.items()]
         yield f"missed: {'; '.join(parts)}"
 
 

@@ -34,7 +34,7 @@ _AROUND = 60
 _BESIDE = 3
 _LEAST_DIRECTIONS = 24
 _PROBED = 48
-# Off the far end of the shell, so that rounding a pose keeps it inside.
+# Off an end of the shell, so that rounding a pose keeps it inside.
 _NUDGE_M = 1e-4
 # Sine of the angle to the vertical below which a direction has no level across it.
 _LEVEL = 1e-6
@@ -102,6 +102,22 @@ class Candidates(Generic[_D]):
             tiled, _ = tiled_poses(self.site, directions, self.rolls)
             poses = np.concatenate([poses, tiled])
         return self._at(poses)
+
+    def nearest(self, n: int) -> tuple[_D, ...]:
+        """Return about n candidates over the workspace, as near as the shell allows.
+
+        What a turn leaves unknown of a point grows with the distance. In tiled
+        placement all stand a standoff away anyway: none.
+        """
+        if self.site is not None:
+            return ()
+        positions = shell_positions(
+            self.workspace, self._shell, -(-n // len(self.rolls))
+        )
+        offsets = positions - np.array(self.workspace.centre)
+        offsets /= np.linalg.norm(offsets, axis=1, keepdims=True)
+        near = min(0.5 * sum(self._shell), self._shell[0] + _NUDGE_M)
+        return self._at(self._aimed(self._positions(offsets, near)))
 
     def around(
         self,

@@ -1,0 +1,170 @@
+"""Cameras that make drawn rigs surer, against rigs that are off by each error."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from support.fewer_samples import draw_fewer
+
+from planning.cameras import surer_cameras as searching
+from planning.cameras.pair_errors import PairErrors
+from planning.cameras.surer_cameras import Aim, surer_cameras
+from planning.model.calibration_errors import AS_PLANNED, CalibrationErrors
+from planning.model.document.certificates import CountArea
+from planning.proofs.candidate_certificate import PlannedStage, counted
+from planning.report.tolerance.built_case import BuiltCase
+from planning.report.tolerance.drawn_rigs import deviations_of
+from planning.report.tolerance.tolerance import draw, question_of
+from planning.scene.camera_views import CandidateViews, camera_views
+from planning.scene.measured import lit_samples
+
+_OFF = CalibrationErrors(np.radians(0.02), 5e-5, 2e-4, 0.3)
+_SMALL = 1e-2
+
+
+@pytest.fixture(scope="module", params=["diverging", "parallel"])
+def plan(request, handmade):
+    def stated(document):
+        document["coverage"]["samples"] = 400
+        document["requirements"]["triangulation"] |= {
+            "calibration": vars(_OFF),
+            "accuracy_of": "noise",
+        }
+
+    with pytest.MonkeyPatch.context() as patch:
+        draw_fewer(patch, region_claims=30, surer=400)
+        yield handmade.tampered(handmade.build_plan(request.param), stated)
+
+
+@pytest.fixture(scope="module")
+def case(plan):
+    return BuiltCase.of(plan, threads=1).shared()
+
+
+@pytest.fixture(scope="module")
+def errors(plan, case):
+    samples = lit_samples(case.scene, plan.projectors, case.target)
+    views = camera_views(case.scene, plan.cameras, samples.target)
+    limits = plan.requirements.triangulation
+    return PairErrors.of(limits, plan.projectors, samples, views)
+
+
+def test_each_error_does_what_a_rig_does_that_is_off_by_it(plan, case, errors):
+    best = errors.sigma.argmin(axis=1)
+    at = errors.place[np.arange(len(best)), best]
+    at = at[at >= 0]
+    outcome = case.planned
+    some = np.flatnonzero(outcome.measured)
+    assert len(at) == len(some) > 50
+    parts = (errors.noise**2, errors.by_projector**2, errors.by_camera**2)
+    total = parts[0][at] + sum(part[at].sum(axis=1) for part in parts[1:])
+    assert np.sqrt(total) == pytest.approx(outcome.sigma[some], rel=1e-9)
+    n_p, sizes = len(plan.projectors), deviations_of(_OFF)
+    nothing = np.zeros((len(case.target), 3))
+
+    def rig_error(kind, column):
+        unknown = np.zeros((len(case.rig.devices), 9))
+        rows = range(n_p) if kind == 0 else range(n_p, len(unknown))
+        unknown[list(rows), column] = _SMALL * sizes[column]
+        return case.errors(outcome, case.rig, unknown, nothing)[some] / _SMALL
+
+    for kind, vectors in enumerate((errors.by_projector, errors.by_camera)):
+        # Turns and displacements are told about the world's axes, not the device's.
+        for own, drawn in ((slice(0, 3), (3, 4, 5)), (slice(3, 6), (0, 1, 2))):
+            exact = sum(rig_error(kind, column) ** 2 for column in drawn)
+            told = np.sum(vectors[at, own] ** 2, axis=1)
+            assert told == pytest.approx(exact, rel=2e-3, abs=1e-16)
+        focal = np.abs(rig_error(kind, 6))
+        assert np.abs(vectors[at, 6]) == pytest.approx(focal, rel=2e-3, abs=1e-9)
+
+
+def test_the_quantile_is_that_of_drawn_rigs(plan, case, errors):
+    rigs = draw(case, question_of(plan, AS_PLANNED, None, None), range(70), threads=1)
+    every = range(len(plan.cameras))
+    for quantile in (0.5, 0.9):
+        drawn = np.quantile([rig.rms_m for rig in rigs], quantile)
+        assert errors.of_rigs(every, quantile)[0] == pytest.approx(drawn, rel=0.1)
+
+
+def test_a_turned_camera_costs_its_own_points_so_much(plan, case, errors):
+    outcome, n_p = case.planned, len(plan.projectors)
+    _, turns = errors.of_rigs(range(len(plan.cameras)), 0.5)
+    nothing = np.zeros((len(case.target), 3))
+    for c, told in enumerate(turns):
+        own, columns = outcome.best[1] == c, []
+        for axis in (3, 4, 5):
+            unknown = np.zeros((len(case.rig.devices), 9))
+            unknown[n_p + c, axis] = _SMALL * _OFF.angle
+            moved = case.errors(outcome, case.rig, unknown, nothing)
+            columns.append(moved[own] / _SMALL)
+        worst = np.linalg.norm(np.column_stack(columns), 2) / np.sqrt(own.sum())
+        assert told == pytest.approx(worst, rel=2e-3)
+
+
+def _on_its_samples(case, projectors, cameras):
+    """Errors over the samples that cameras are sought on."""
+    target = case.scene.target_samples(searching.DRAWS.surer)
+    samples = lit_samples(case.scene, projectors, target)
+    views = camera_views(case.scene, cameras, samples.target)
+    limits = case.scene.requirements.triangulation
+    return PairErrors.of(limits, projectors, samples, views)
+
+
+def test_cameras_are_added_until_the_aim_is_reached(plan, case):
+    scene, projectors, cameras = case.scene, plan.projectors, plan.cameras[:1]
+    before = _on_its_samples(case, projectors, cameras)
+    alone = before.of_rigs([0], 0.95)[0]
+    around = searching._candidates(scene, cameras[0]).around(cameras, 40)[::3]
+    views = CandidateViews(scene.among(()), (*plan.cameras, *around))
+    stage = SimpleNamespace(cover=SimpleNamespace(candidates=views))
+
+    def found(rms, more=0.0, most=None, turn=None):
+        required = replace(scene.requirements, max_cameras=most)
+        return surer_cameras(
+            replace(scene, requirements=required),
+            *(projectors, stage, cameras),
+            *(Aim(0.95, rms, turn, more), 20),
+        )
+
+    assert found(1.01 * alone) == cameras
+    surer = found(0.95 * alone)
+    after = _on_its_samples(case, projectors, surer)
+    assert after.of_rigs(range(len(surer)), 0.95)[0] <= 0.95 * alone
+    measured = after.measured(range(len(surer))).sum()
+    assert measured >= before.measured([0]).sum()
+    again = found(0.95 * alone)
+    assert [c.world_from_device.tolist() for c in again] == [
+        c.world_from_device.tolist() for c in surer
+    ]
+    assert len(found(0.1 * alone, most=2)) == 2
+    dearest = max(before.of_rigs([0], 0.95)[1])
+    milder = found(1.01 * alone, turn=0.9 * dearest)
+    turns = _on_its_samples(case, projectors, milder).of_rigs(range(len(milder)), 0.95)
+    assert max(turns[1]) <= 0.9 * dearest
+    # Where nothing is asked of errors, more of the surface may be.
+    wider = found(None, more=0.1)
+    seen = _on_its_samples(case, projectors, wider).measured(range(len(wider)))
+    assert seen.sum() >= 1.1 * before.measured([0]).sum()
+
+
+def test_a_count_beyond_the_cover_is_no_proof(handmade):
+    proof = handmade.build_plan().document.certificates.cameras
+    area = proof.best_area
+    row = CountArea(
+        count=proof.count, value_m2=area.value_m2, upper_bound_m2=area.upper_bound_m2
+    )
+    more = row.changed(count=proof.count + 1)
+    proof = proof.changed(by_count=(row, more), one_fewer=None, given=proof.count)
+    cover = {n: ("C",) * n for n in (proof.count, proof.count + 1)}
+    before, n = PlannedStage(cover, proof), proof.count + 3
+    after = counted(before, ("D",) * n, 1.0)
+    assert after.certificate.status == "feasible"
+    assert after.certificate.count == after.certificate.needed.count == n
+    assert after.certificate.candidates == proof.candidates
+    assert after.certificate.best_area.upper_bound_m2 == 1.0
+    assert after.certificate.by_count == (row,)
+    assert after.by_count == {proof.count: cover[proof.count], n: ("D",) * n}
+    same = counted(before, ("D",) * proof.count, 1.0)
+    assert same.certificate == proof
+    assert same.by_count[proof.count][0] == "D"
