@@ -61,12 +61,13 @@ def row(name: str, plan: RigPlan, seconds: str) -> str:
     asked = Asked.of(plan.requirements)
     missed = [asked.missed(rig) for rig in rigs]
     names = [name for each in missed for name in each]
+    turned = ", ".join(f"{1e3 * each:.3f}" for each in found.dearest_turn())
     rms = 1e3 * np.array([rig.rms_m or np.inf for rig in rigs])
     each = ", ".join(f"{one} {names.count(one)}" for one in dict.fromkeys(names))
     return (
         f"| {name} | {len(plan.projectors)} + {len(plan.cameras)} | "
         f"{np.median(angles):.1f}, {np.quantile(angles, 0.05):.1f} | "
-        f"{1e3 * found.dearest_turn():.3f} | {np.median(rms):.3f}, "
+        f"{turned} | {np.median(rms):.3f}, "
         f"{np.quantile(rms, 0.95):.3f} | {missed.count(())} of {_RIGS} | {each or '-'} "
         f"| {seconds} |"
     )
@@ -76,7 +77,8 @@ def main(names: list[str]) -> None:
     """Print the table, an object as soon as it is planned."""
     print(
         "| mesh, plan | projectors + cameras | view to light, median, 5 % [degrees] | "
-        f"dearest camera turned [mm] | {_RIGS} drawn rigs: rms, median, 95 % [mm] | "
+        "dearest camera turned, of the target, of its own points [mm] | "
+        f"{_RIGS} drawn rigs: rms, median, 95 % [mm] | "
         "meet what was asked | missed by | planned [s] |"
     )
     print("|---" * 8 + "|", flush=True)

@@ -98,21 +98,15 @@ class PairErrors:
         """Return which samples cameras measure, shape (n,)."""
         return np.any(np.isfinite(self.sigma[:, cameras]), axis=1)
 
-    def of_rigs(
-        self, cameras: Sequence[int], quantile: float
-    ) -> tuple[float, list[float]]:
-        """Return that quantile of rigs' rms errors over what cameras measure [m].
-
-        Then of each camera that measures anything the rms error of its own points when
-        it alone is turned, about the worst axis, by what its calibration leaves [m].
-        """
+    def of_rigs(self, cameras: Sequence[int], quantile: float) -> float:
+        """Return that quantile of rigs' rms errors over what cameras measure [m]."""
         chosen = np.array(cameras, dtype=np.int64)
         best = self.sigma[:, chosen].argmin(axis=1)
         at = self.place[np.arange(len(best)), chosen[best]]
         best, at = best[at >= 0], at[at >= 0]
         if not len(at):
-            return np.inf, []
-        mine = [at[best == k] for k in np.unique(best).tolist()]
+            return np.inf
+        mine = (at[best == k] for k in np.unique(best).tolist())
         own = [self._spread(each) / len(at) for each in mine]
         # Errors of a projector hang together over the pairs of all cameras.
         shared = _BY_PROJECTOR * (int(self.projector.max()) + 1)
@@ -124,15 +118,7 @@ class PairErrors:
             square += float(np.sum(np.square(view[:, shared:])))
             square += 2.0 * float(np.sum(np.square(view[:, :shared])))
         noise = float(np.mean(np.square(self.noise[at])))
-        # Three axes share the square of a turn.
-        turns = [
-            3.0 * np.linalg.eigvalsh(form[shared:, shared:][:3, :3])[-1] / len(each)
-            for form, each in zip(own, mine, strict=True)
-        ]
-        return (
-            float(np.sqrt(noise + _quantile(trace, square, quantile))),
-            np.sqrt(len(at) * np.maximum(turns, 0.0)).tolist(),
-        )
+        return float(np.sqrt(noise + _quantile(trace, square, quantile)))
 
     def _spread(self, at: _Index) -> _Array:
         """Sum of a a^T over pairs of one camera: all projectors' errors, then its own.

@@ -34,7 +34,7 @@ _GAIN = 5e-4
 # Selections that are looked at in full, at most.
 _WORK = 20_000
 # What is lacking, of the most important first.
-_Lack = tuple[int, float, float]
+_Lack = tuple[int, float]
 
 
 @dataclass(frozen=True)
@@ -44,14 +44,11 @@ class Aim:
     Attributes:
         quantile: Share of drawn rigs.
         rms_m: What the rms error of so many stays below [m]; None: nothing is asked.
-        turn_m: What a camera turned by what its calibration leaves costs its own points
-            at most, rms [m]; None likewise.
         more: Of what is reachable, share that must be measured beyond the present.
     """
 
     quantile: float
     rms_m: float | None
-    turn_m: float | None = None
     more: float = 0.0
 
 
@@ -155,19 +152,17 @@ class _Search:
         return chosen
 
     def _short(self, chosen: Sequence[int]) -> _Lack:
-        """Samples that lack, then by how much the rms and the turns are too large."""
+        """Samples that lack, then by which share the rms is too large."""
         self.scene.check_cancelled()
         self._done += 1
         lacking = self.quotas.lacking(self.errors.measured(chosen))
-        rms, turn = self.aim.rms_m, self.aim.turn_m or np.inf
-        if rms is None:
-            return lacking, 0.0, 0.0
-        found, turns = self.errors.of_rigs(chosen, self.aim.quantile)
-        over = sum(max(each / turn - 1.0, 0.0) for each in turns)
-        return lacking, max(found / rms - 1.0, 0.0), over
+        if self.aim.rms_m is None:
+            return lacking, 0.0
+        found = self.errors.of_rigs(chosen, self.aim.quantile)
+        return lacking, max(found / self.aim.rms_m - 1.0, 0.0)
 
     def _reached(self, now: _Lack) -> bool:
-        return self._done >= _WORK or now == (0, 0.0, 0.0)
+        return self._done >= _WORK or now == (0, 0.0)
 
     def _exchanged(self, chosen: list[int], now: _Lack) -> tuple[list[int], _Lack]:
         """Exchange one camera after the other until none of them is worth it."""

@@ -84,22 +84,7 @@ def test_the_quantile_is_that_of_drawn_rigs(plan, case, errors):
     every = range(len(plan.cameras))
     for quantile in (0.5, 0.9):
         drawn = np.quantile([rig.rms_m for rig in rigs], quantile)
-        assert errors.of_rigs(every, quantile)[0] == pytest.approx(drawn, rel=0.1)
-
-
-def test_a_turned_camera_costs_its_own_points_so_much(plan, case, errors):
-    outcome, n_p = case.planned, len(plan.projectors)
-    _, turns = errors.of_rigs(range(len(plan.cameras)), 0.5)
-    nothing = np.zeros((len(case.target), 3))
-    for c, told in enumerate(turns):
-        own, columns = outcome.best[1] == c, []
-        for axis in (3, 4, 5):
-            unknown = np.zeros((len(case.rig.devices), 9))
-            unknown[n_p + c, axis] = _SMALL * _OFF.angle
-            moved = case.errors(outcome, case.rig, unknown, nothing)
-            columns.append(moved[own] / _SMALL)
-        worst = np.linalg.norm(np.column_stack(columns), 2) / np.sqrt(own.sum())
-        assert told == pytest.approx(worst, rel=2e-3)
+        assert errors.of_rigs(every, quantile) == pytest.approx(drawn, rel=0.1)
 
 
 def _on_its_samples(case, projectors, cameras):
@@ -114,23 +99,23 @@ def _on_its_samples(case, projectors, cameras):
 def test_cameras_are_added_until_the_aim_is_reached(plan, case):
     scene, projectors, cameras = case.scene, plan.projectors, plan.cameras[:1]
     before = _on_its_samples(case, projectors, cameras)
-    alone = before.of_rigs([0], 0.95)[0]
+    alone = before.of_rigs([0], 0.95)
     around = searching._candidates(scene, cameras[0]).around(cameras, 40)[::3]
     views = CandidateViews(scene.among(()), (*plan.cameras, *around))
     stage = SimpleNamespace(cover=SimpleNamespace(candidates=views))
 
-    def found(rms, more=0.0, most=None, turn=None):
+    def found(rms, more=0.0, most=None):
         required = replace(scene.requirements, max_cameras=most)
         return surer_cameras(
             replace(scene, requirements=required),
             *(projectors, stage, cameras),
-            *(Aim(0.95, rms, turn, more), 20),
+            *(Aim(0.95, rms, more), 20),
         )
 
     assert found(1.01 * alone) == cameras
     surer = found(0.95 * alone)
     after = _on_its_samples(case, projectors, surer)
-    assert after.of_rigs(range(len(surer)), 0.95)[0] <= 0.95 * alone
+    assert after.of_rigs(range(len(surer)), 0.95) <= 0.95 * alone
     measured = after.measured(range(len(surer))).sum()
     assert measured >= before.measured([0]).sum()
     again = found(0.95 * alone)
@@ -138,10 +123,6 @@ def test_cameras_are_added_until_the_aim_is_reached(plan, case):
         c.world_from_device.tolist() for c in surer
     ]
     assert len(found(0.1 * alone, most=2)) == 2
-    dearest = max(before.of_rigs([0], 0.95)[1])
-    milder = found(1.01 * alone, turn=0.9 * dearest)
-    turns = _on_its_samples(case, projectors, milder).of_rigs(range(len(milder)), 0.95)
-    assert max(turns[1]) <= 0.9 * dearest
     # Where nothing is asked of errors, more of the surface may be.
     wider = found(None, more=0.1)
     seen = _on_its_samples(case, projectors, wider).measured(range(len(wider)))

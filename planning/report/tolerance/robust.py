@@ -87,7 +87,7 @@ def robustly(planned: Planned) -> Planned:
         robust = _robust(request, plan.requirements)
         rms = Asked.of(plan.requirements).rms_m
         # Rigs that vary as predicted leave no more than this to chance.
-        latest, aim = (plan, partial), Aim(least_met(quantile, _RIGS) / _RIGS, rms, rms)
+        latest, aim = (plan, partial), Aim(least_met(quantile, _RIGS) / _RIGS, rms)
         rounds: list[_Round] = []
         try:
             while True:
