@@ -164,19 +164,19 @@ def _drawn(
 
 
 def _short(drawn: _Round, quantile: float) -> dict[str, float]:
-    """Return of each figure that too many rigs miss what all but these reach.
+    """Return of each figure that too many rigs miss what all but the spare reach.
 
-    Several figures share what is to spare: each may be missed by other rigs.
+    Where none alone is missed by too many, of all that are missed: by other rigs each.
     """
     spare = _RIGS - least_met(quantile, _RIGS)
     if _RIGS - drawn.n_met <= spare:
         return {}
-    each = spare // max(len(drawn.missed_by), 1)
+    too_many = [name for name, count in drawn.missed_by.items() if count > spare]
+    each = spare if too_many else spare // len(drawn.missed_by)
     found: dict[str, float] = {}
-    for name, count in drawn.missed_by.items():
-        if count > each:
-            values = sorted(getattr(rig, name) or 0.0 for rig in drawn.rigs)
-            found[name] = values[-1 - each] if name == "rms_m" else values[each]
+    for name in too_many or drawn.missed_by:
+        values = sorted(getattr(rig, name) or 0.0 for rig in drawn.rigs)
+        found[name] = values[-1 - each] if name == "rms_m" else values[each]
     return found
 
 
