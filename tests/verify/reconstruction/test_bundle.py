@@ -49,7 +49,8 @@ def test_slopes_are_the_derivatives_by_every_unknown(bundle):
 
 def test_an_adjustment_finds_what_a_rig_is_off_by_within_its_covariance(bundle):
     """All unknowns drawn as expected, outliers among the edges: chi squared fits."""
-    expected = expected_of(bundle, ERRORS, PLACED)
+    expected = expected_of(bundle, ERRORS)
+    expected[bundle.columns("objects", 0)] = np.repeat(PLACED, (3, 3, 1))
     rng = np.random.default_rng(5)
     true = expected * rng.normal(size=len(expected))
     seen = simulated_edges(

@@ -10,12 +10,13 @@ coordinate that a projector draws, an edge is therefore off its ring by another 
 and by -g.v if the projector moves. Where facets meet, slopes jump with N.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
-from scipy.linalg import block_diag
+from scipy.linalg import block_diag, expm
+from scipy.sparse import csr_array
 from scipy.spatial.transform import Rotation
 
 from planning.verify.reconstruction.arrays import Array, Indices
@@ -55,6 +56,9 @@ class Bundle:
     supposed: Supposed
     patch: Indices | None = None
     relief_m: float = 0.0
+    _last: dict[bytes, tuple[Supposed, Places]] = field(
+        default_factory=dict, init=False, repr=False
+    )
 
     @property
     def n_unknowns(self) -> int:
@@ -68,22 +72,15 @@ class Bundle:
         before = {"cameras": 0, "projectors": len(cameras)}
         first = index + before.get(role, len(cameras + projectors))
         size = _OF_OBJECT if role == "objects" else _OF_DEVICE
-        begin = _OF_DEVICE * first
-        return np.arange(begin, begin + size)[part]
+        return _OF_DEVICE * first + np.arange(size)[part]
 
     def moved(self, x: Array) -> Supposed:
         """Return how everything stands after changes, shape (n_unknowns,)."""
-        rig = self.supposed
-        cameras = tuple(
-            _moved_device(one, x[self.columns("cameras", k)])
-            for k, one in enumerate(rig.cameras)
-        )
-        projectors = tuple(
-            _moved_device(one, x[self.columns("projectors", k)])
-            for k, one in enumerate(rig.projectors)
-        )
-        change, (body,) = x[self.columns("objects", 0)], rig.objects
-        scale = body.scale * (1.0 + float(change[ZOOM][0]))
+        rig, changes = self.supposed, iter(by_body(x))
+        cameras = tuple(_moved(one, next(changes)) for one in rig.cameras)
+        projectors = tuple(_moved(one, next(changes)) for one in rig.projectors)
+        change, (body,) = next(changes), rig.objects
+        scale = body.scale * float(np.exp(change[ZOOM][0]))
         pose = _moved_pose(body.world_from_device, change)
         body = replace(body, world_from_device=pose, scale=scale)
         return replace(rig, cameras=cameras, projectors=projectors, objects=(body,))
@@ -94,7 +91,7 @@ class Bundle:
 
         As things are supposed to stand; where an edge misses the object, the median.
         """
-        per_px = self._slopes(self.supposed)[1]
+        per_px = self._first[1]
         typical = np.nanmedian(per_px) if np.isfinite(per_px).any() else 1.0
         per_px = np.where(np.isfinite(per_px), per_px, typical)
         return np.fmax(per_px, _LEAST_SLOPE * typical) * np.hypot(
@@ -103,18 +100,26 @@ class Bundle:
 
     def offsets(self, x: Array) -> Array:
         """Return rho - R in units of sigma after changes, NaN as `offsets`, (n,)."""
-        rig = self.moved(x)
-        return offsets(self.evidence, rig, places(self.evidence, rig))[0] / self.sigma
+        return offsets(self.evidence, *self._standing(x))[0] / self.sigma
 
     def slopes(self, x: Array) -> Array:
         """Return their derivatives by the changes, (n, n_unknowns)."""
-        slopes = self._slopes(self.moved(x))[0] / self.sigma[:, None]
-        return slopes @ self._inner(x)
+        slopes = self._slopes(*self._standing(x))[0] / self.sigma[:, None]
+        inner = block_diag(*(_inner(change) for change in by_body(x)))
+        return slopes @ np.asarray(inner, np.float64)
+
+    def _standing(self, x: Array) -> tuple[Supposed, Places]:
+        """How all stands after changes, and where edges lie; the last is kept."""
+        if (key := x.tobytes()) not in self._last:
+            rig = self.moved(x)
+            self._last.clear()
+            self._last[key] = rig, places(self.evidence, rig)
+        return self._last[key]
 
     @cached_property
     def _by_relief(self) -> tuple[Array, Array]:
         """What an offset of a patch does to edges (n,), and its squares' sum (n,)."""
-        rising = np.nan_to_num(self._slopes(self.supposed)[2] / self.sigma)
+        rising = np.nan_to_num(self._first[2] / self.sigma)
         assert self.patch is not None
         squares = np.bincount(self.patch, rising**2).astype(np.float64)
         return rising, squares[self.patch]
@@ -134,9 +139,9 @@ class Bundle:
         with np.errstate(invalid="ignore", divide="ignore"):
             a = (1.0 - 1.0 / np.sqrt(1.0 + self.relief_m**2 * squares)) / squares
         a, columns = np.where(squares > 0.0, a, 0.0), values.reshape(len(values), -1)
-        sums = np.zeros((int(self.patch.max()) + 1, columns.shape[1]))
-        np.add.at(sums, self.patch, rising[:, None] * columns)
-        taken = (a * rising)[:, None] * sums[self.patch]
+        which = np.arange(len(values)), self.patch
+        of_patch = csr_array((rising, which), (len(values), int(self.patch.max()) + 1))
+        taken = a[:, None] * (of_patch @ (of_patch.T @ columns))
         return (columns - taken).reshape(values.shape)
 
     def relief(self, off: Array) -> float:
@@ -152,31 +157,13 @@ class Bundle:
         heights = np.bincount(patch, rising * off[known])[measured] / squares[measured]
         return 1.4826 * float(np.median(np.abs(heights))) if len(heights) else 0.0
 
-    def _inner(self, x: Array) -> Array:
-        """Derivative of changes from where things stand after x, by x: block diagonal.
+    @cached_property
+    def _first(self) -> tuple[Array, Array, Array]:
+        return self._slopes(*self._standing(np.zeros(self.n_unknowns)))
 
-        A turn w changes by J dw, with ``J = I - (1 - cos t) / t^2 [w] + (t - sin t) /
-        t^3 [w]^2``, t = |w|; a displacement shows in the turned axes.
-        """
-        blocks: list[Array] = []
-        rig = self.supposed
-        for size in (*[_OF_DEVICE] * len(rig.cameras + rig.projectors), _OF_OBJECT):
-            change = x[sum(map(len, blocks)) :][:size]
-            turn = change[TURN]
-            t = float(np.linalg.norm(turn))
-            cross = np.cross(np.eye(3), turn)
-            block = np.eye(size)
-            if t > 0.0:
-                block[TURN, TURN] += (t - np.sin(t)) / t**3 * cross @ cross
-                block[TURN, TURN] -= (1.0 - np.cos(t)) / t**2 * cross
-            block[SHIFT, SHIFT] = Rotation.from_rotvec(turn).as_matrix().T
-            block[ZOOM, ZOOM] /= 1.0 + change[ZOOM]
-            blocks.append(block)
-        return np.asarray(block_diag(*blocks), np.float64)
-
-    def _slopes(self, rig: Supposed) -> tuple[Array, Array, Array]:
+    def _slopes(self, rig: Supposed, at: Places) -> tuple[Array, Array, Array]:
         """Derivatives of rho - R by a rig's changes, by a pixel, by surface raised."""
-        evidence, at = self.evidence, places(self.evidence, rig)
+        evidence = self.evidence
         slopes = np.zeros((len(evidence), self.n_unknowns))
         per_px, rising = np.zeros((2, len(evidence)))
         pairs = np.column_stack([evidence.projector, evidence.camera])
@@ -248,6 +235,24 @@ def _dot(a: Array, b: Array) -> Array:
     return np.einsum("ij,ij->i", a, b)[:, None]
 
 
+def by_body(x: Array) -> list[Array]:
+    """Return what belongs to each camera, each projector and the object."""
+    return np.split(x, range(_OF_DEVICE, len(x), _OF_DEVICE))
+
+
+def _inner(change: Array) -> Array:
+    """Derivative, by a body's change, of changes from where it stands after it.
+
+    A turn w changes by J dw, J the integral of exp(-s [w]) over s from 0 to 1, which is
+    a block of an exponential; a displacement shows in the turned axes.
+    """
+    turn, twice, block = change[TURN], np.zeros((6, 6)), np.eye(len(change))
+    twice[:3, :3], twice[:3, 3:] = np.cross(turn, np.eye(3)), np.eye(3)
+    block[TURN, TURN] = expm(twice)[:3, 3:]
+    block[SHIFT, SHIFT] = Rotation.from_rotvec(turn).as_matrix().T
+    return block
+
+
 def _moved_pose(pose: Array, change: Array) -> Array:
     turn = np.eye(4)
     turn[:3, :3] = Rotation.from_rotvec(change[TURN]).as_matrix()
@@ -255,9 +260,9 @@ def _moved_pose(pose: Array, change: Array) -> Array:
     return pose @ turn
 
 
-def _moved_device(device: _Device, change: Array) -> _Device:
+def _moved(device: _Device, change: Array) -> _Device:
     matrix = device.matrix.copy()
-    matrix[[0, 1], [0, 1]] *= 1.0 + float(change[ZOOM][0])
+    matrix[[0, 1], [0, 1]] *= np.exp(change[ZOOM])
     matrix[:2, 2] += change[CENTRE]
     pose = _moved_pose(device.world_from_device, change)
     return replace(device, world_from_device=pose, matrix=matrix)

@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from planning.verify.reconstruction.arrays import Array, Indices, Mask
+from planning.verify.reconstruction.arrays import Array, Indices
 
 from .bundle import SHIFT, TURN, ZOOM, Bundle
 from .supposed import Evidence, Role, Supposed, mismatches, places
@@ -55,10 +55,6 @@ class Change:
         """Return whether it is the other one again, or with more freedom."""
         same = self.role == other.role and self.devices == other.devices
         return same and {*self.moves} >= {*other.moves}
-
-    def concerns(self, evidence: Evidence) -> Mask:
-        """Return which edges it bears on."""
-        return np.isin(evidence.index(self.role), self.devices)
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,56 +7,65 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from planning.verify.reconstruction.arrays import Array
-from planning.verify.reconstruction.calibration import DeviceCalibration
 
-from .adjustment import adjust
-from .bundle import SHIFT, TURN, Bundle
+from .adjustment import adjust, expected_of
+from .bundle import Bundle
 from .explanations import Change, Explanation, misfit
+from .search import FAULT
 from .supposed import Evidence, Role, Supposed
 
 _ROLES: tuple[Role, Role] = ("cameras", "projectors")
-# Directions about the object that a device is tried in, and turns about each.
-_PLACES, _ROLLS = 120, 6
+# A change must leave no more than this share of the mismatch.
+MUST_LEAVE = 0.5
+# Turns about the object that a device is tried in.
+_PLACES = 720
 # Starts are compared on every so many edges, with this cap; the best few are fitted.
-_THIN, _FAR_CAP_M, _FITTED = 4, 5e-2, 12
-# What a device may have been turned and displaced by from there [rad], [m].
-_TURNED, _SHIFTED_M = 0.3, 0.3
+_THIN, _FAR_CAP_M, _FITTED = 8, 5e-2, 12
 
 
 def gross(evidence: Evidence, rig: Supposed) -> Explanation:
     """Return the swap, or the one device elsewhere, that leaves the least mismatch."""
     before = misfit(evidence, rig)
-    tried: list[tuple[Change, Supposed]] = []
+
+    def explained(change: Change, after: Supposed) -> Explanation:
+        return Explanation(change, rig, after, (before, misfit(evidence, after)))
+
+    found: list[Explanation] = []
     for role in _ROLES:
         for one, other in combinations(range(len(getattr(rig, role))), 2):
             swapped = list(getattr(rig, role))
             swapped[one], swapped[other] = swapped[other], swapped[one]
-            change = Change(role, (one, other), ("swap",))
-            tried.append((change, replace(rig, **{role: tuple(swapped)})))
-    found = [
-        Explanation(change, rig, after, (before, misfit(evidence, after)))
-        for change, after in tried
+            after = replace(rig, **{role: tuple(swapped)})
+            found.append(explained(Change(role, (one, other), ("swap",)), after))
+    best = min(found, key=lambda each: each.left_m[1], default=None)
+    if best is not None and best.left_m[1] <= MUST_LEAVE * before:
+        return best
+    alone = [
+        (Change(role, (index,), ("turn", "shift")), evidence.index(role) == index)
+        for role in _ROLES
+        for index in np.unique(evidence.index(role)).tolist()
     ]
-    best = min(found, key=lambda e: e.left_m[1], default=None)
-    if best is None or best.left_m[1] > 0.5 * before:
-        found += [
-            _elsewhere(evidence, rig, role, index, before)
-            for role in _ROLES
-            for index in np.unique(evidence.index(role)).tolist()
-        ]
-    return min(found, key=lambda e: e.left_m[1])
+    # The device whose edges are farthest off first.
+    alone.sort(key=lambda one: -misfit(evidence.take(np.flatnonzero(one[1])), rig))
+    for change, own in alone:
+        few = evidence.take(np.flatnonzero(own)[::_THIN])
+        found.append(explained(change, _elsewhere(evidence, few, rig, change)))
+        if found[-1].left_m[1] <= MUST_LEAVE * before:
+            return found[-1]
+    return min(found, key=lambda each: each.left_m[1])
 
 
 def _elsewhere(
-    evidence: Evidence, rig: Supposed, role: Role, index: int, before: float
-) -> Explanation:
-    """Fit a device's pose from all about the object."""
-    change = Change(role, (index,), ("turn", "shift"))
-    few = evidence.take(np.flatnonzero(change.concerns(evidence))[::_THIN])
-    device: DeviceCalibration = getattr(rig, role)[index]
-    middle = rig.objects[0].centre
+    evidence: Evidence, few: Evidence, rig: Supposed, change: Change
+) -> Supposed:
+    """Fit a device's pose from all about the object, over a few of its edges first."""
+    role, (index,) = change.role, change.devices
+    device, middle = getattr(rig, role)[index], rig.objects[0].centre
 
-    def posed(pose: Array) -> Supposed:
+    def turned(turn: Array) -> Supposed:
+        pose = np.eye(4)
+        pose[:3, :3] = turn @ device.world_from_device[:3, :3]
+        pose[:3, 3] = middle + turn @ (device.centre - middle)
         devices = list(getattr(rig, role))
         devices[index] = replace(device, world_from_device=pose)
         return replace(rig, **{role: tuple(devices)})
@@ -64,40 +73,12 @@ def _elsewhere(
     def left(one: Supposed) -> float:
         return misfit(few, one, _FAR_CAP_M)
 
-    starts = map(posed, _far_poses(device.world_from_device, middle))
-    fitted = [
-        _fitted(Bundle(few, one), change) for one in sorted(starts, key=left)[:_FITTED]
-    ]
-    after = _fitted(Bundle(evidence, min(fitted, key=left)), change)
-    return Explanation(change, rig, after, (before, misfit(evidence, after)))
+    def fitted(edges: Evidence, one: Supposed) -> Supposed:
+        bundle = Bundle(edges, one)
+        expected, columns = np.zeros(bundle.n_unknowns), change.columns(bundle)
+        expected[columns] = expected_of(bundle, FAULT)[columns]
+        return adjust(bundle, expected).supposed
 
-
-def _fitted(bundle: Bundle, change: Change) -> Supposed:
-    expected = np.zeros(bundle.n_unknowns)
-    for part, value in ((TURN, _TURNED), (SHIFT, _SHIFTED_M)):
-        expected[bundle.columns(change.role, change.devices[0], part)] = value
-    return adjust(bundle, expected).supposed
-
-
-def _far_poses(pose: Array, middle: Array) -> list[Array]:
-    """Return poses all about the object at the same distance, in several rolls.
-
-    The directions are a Fibonacci lattice on the sphere; the aim at the object stays.
-    The pose itself comes first.
-    """
-    k = np.arange(_PLACES) + 0.5
-    z = 1.0 - 2.0 * k / _PLACES
-    turn = np.pi * (1.0 + np.sqrt(5.0)) * k
-    flat = np.sqrt(1.0 - z * z)
-    sphere = np.column_stack([flat * np.cos(turn), flat * np.sin(turn), z])
-    away = pose[:3, 3] - middle
-    poses = [pose]
-    for towards in sphere:
-        about = Rotation.align_vectors(towards, away / np.linalg.norm(away))[0]
-        for roll in np.arange(_ROLLS) * (2.0 * np.pi / _ROLLS):
-            turned = (Rotation.from_rotvec(roll * towards) * about).as_matrix()
-            new = np.eye(4)
-            new[:3, :3] = turned @ pose[:3, :3]
-            new[:3, 3] = middle + turned @ away
-            poses.append(new)
-    return poses
+    turns = Rotation.random(_PLACES, random_state=0).as_matrix()
+    starts = sorted(map(turned, [np.eye(3), *turns]), key=left)[:_FITTED]
+    return fitted(evidence, min((fitted(few, one) for one in starts), key=left))

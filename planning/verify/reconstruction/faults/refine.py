@@ -1,9 +1,9 @@
 """A rig refined over the edges of an object, before the clouds are merged.
 
 Edges of all pairs against the mesh, and, where the object isn't the mesh, against each
-other: how far it differs is an unknown of every patch of its surface, whose size as a
-whole the edges tell. What a calibration leaves is expected of the devices; where none
-is stated, what mounting leaves.
+other: how far it differs is an unknown of every patch of its surface. What a calibration
+leaves is expected of the devices, and of where the object stands and how large it is,
+which no edge tells apart from where all devices stand; what is to blame is free.
 """
 
 from dataclasses import replace
@@ -12,24 +12,20 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from planning.model.calibration_errors import CalibrationErrors
-from planning.verify.reconstruction.arrays import Array, Indices
-from planning.verify.reconstruction.calibration import DeviceCalibration
+from planning.verify.reconstruction.arrays import Indices
 from planning.verify.reconstruction.check.refined_rig import Moved, RefinedRig
 from planning.verify.reconstruction.decode.decode import Decoded, Pairs, measure_edges
 from planning.verify.reconstruction.scanner import Scanner
 
 from .adjustment import Adjusted, adjust, expected_of
-from .bundle import BIASED_PX, SHIFT, TURN, ZOOM, Bundle
+from .bundle import BIASED_PX, SHIFT, TURN, ZOOM, Bundle, by_body
 from .cause_words import in_words, untwisted
-from .diagnosis import MOUNTED, PLACED, reachable
-from .explanations import misfit
+from .diagnosis import MOUNTED, reachable, stated
 from .search import Search
-from .supposed import Evidence, Role, Supposed, places
+from .supposed import Evidence, Supposed, places
 
 # What a good calibration leaves of a device, where none is stated.
 CALIBRATED = CalibrationErrors(angle=1e-4, position_m=5e-5, focal=5e-4)
-# Edges of each pair, and of all of them.
-_EDGES_A_PAIR, _EDGES = 900, 20_000
 # A patch of surface is so many ring gaps wide.
 _PATCH_TAU = 2.0
 # The relief that a search begins with [m], and its rounds.
@@ -44,34 +40,28 @@ def refine(believed: Scanner, pairs: Pairs) -> RefinedRig | None:
         believed: Poses and optics as they are believed, what is drawn, and the mesh.
         pairs: What every pair of devices decoded.
     """
-    most = max(1, min(_EDGES_A_PAIR, _EDGES // max(1, len(pairs))))
-    evidence = Evidence.of(believed, pairs, most)
+    evidence = Evidence.of(believed, pairs)
     if len(evidence) == 0:
         return None
     every, causes = reachable(believed, evidence)
     start = every.bundle.supposed
-    errors = believed.calibration
-    if errors is None or errors == CalibrationErrors():
-        errors = CALIBRATED
     bundle = Bundle(evidence, start, _patches(evidence, start), _RELIEF_M)
-    everything = expected_of(bundle, MOUNTED, PLACED)
-    found = adjust(bundle, everything)
+    everything = expected_of(bundle, MOUNTED)
+    every = adjust(bundle, everything)
     for _ in range(_ROUNDS):
-        relief = max(bundle.relief(found.offsets), _LEAST_RELIEF_M)
+        relief = max(bundle.relief(every.offsets), _LEAST_RELIEF_M)
         bundle = replace(bundle, relief_m=relief)
-        found = adjust(bundle, everything, start=found.x, unit=max(1.0, found.scatter))
-    stated = replace(believed, calibration=errors)
-    least = misfit(evidence, found.supposed)
-    search = Search(stated, found, least, PLACED)
-    causes += search.causes()
-    found = search.found
+        every = adjust(bundle, everything, start=every.x, unit=max(1.0, every.scatter))
+    errors = stated(believed, CALIBRATED)
+    more, found = Search(every, errors).causes()
     px = np.hypot(evidence.noise_px, BIASED_PX)
     before = np.abs(bundle.offsets(np.zeros(bundle.n_unknowns)))
     after = np.abs(bundle.apart_from_relief(np.nan_to_num(found.offsets)))
+    refined = _as_refined(believed, found)
     return RefinedRig(
-        _as_refined(believed, found),
-        tuple(_moved(believed, found, expected_of(bundle, errors, PLACED))),
-        tuple(in_words(cause, believed) for cause in causes),
+        refined,
+        tuple(_moved(believed, refined, found, errors)),
+        tuple(in_words(cause, believed) for cause in causes + more),
         float(np.nanmedian(before * px)),
         float(np.median(after * px)),
         bundle.relief_m,
@@ -112,47 +102,41 @@ def _patches(evidence: Evidence, rig: Supposed) -> Indices:
     ].ravel()
 
 
-def _moved(believed: Scanner, found: Adjusted, expected: Array) -> list[Moved]:
+def _moved(
+    believed: Scanner, refined: Scanner, found: Adjusted, errors: CalibrationErrors
+) -> list[Moved]:
     """Return what moved by how much, the largest surprise first."""
-    bundle, rig = found.bundle, found.supposed
-    sigma = np.sqrt(np.diag(found.covariance))
-    surprise = found.x / np.where(expected > 0.0, expected, np.inf)
+    devices = zip(
+        believed.cameras + believed.projectors,
+        refined.cameras + refined.projectors,
+        strict=True,
+    )
+    (mesh,), (body,) = Supposed.of(believed).objects, found.supposed.objects
+    bodies = [
+        (one.id, one, now, float(now.matrix[0, 0] / one.matrix[0, 0]))
+        for one, now in devices
+    ]
+    expected = expected_of(found.bundle, errors)
+    surprises = by_body(found.x / np.where(expected > 0.0, expected, np.inf))
+    sigmas = by_body(np.sqrt(np.diag(found.covariance)))
     rows: list[Moved] = []
-    of: dict[Role, tuple[DeviceCalibration, ...]] = {
-        "cameras": believed.cameras,
-        "projectors": believed.projectors,
-    }
-    for role, devices in of.items():
-        for k, one in enumerate(devices):
-            now = untwisted(one, getattr(rig, role)[k])
-            zoom = float(now.matrix[0, 0] / one.matrix[0, 0]) - 1.0
-            poses = one.world_from_device, now.world_from_device
-            columns = bundle.columns(role, k)
-            row = _row(one.id, poses, zoom, sigma[columns], surprise[columns])
-            rows.append(row)
-    (body,), (mesh,) = rig.objects, Supposed.of(believed).objects
-    poses, own = (
-        (mesh.world_from_device, body.world_from_device),
-        bundle.columns("objects", 0),
-    )
-    rows.append(_row("object", poses, body.scale - 1.0, sigma[own], surprise[own]))
+    for (name, one, now, size), sigma, surprise in zip(
+        [*bodies, ("object", mesh, body, body.scale)], sigmas, surprises, strict=True
+    ):
+        turn = now.world_from_device[:3, :3] @ one.world_from_device[:3, :3].T
+        shift = (now.world_from_device - one.world_from_device)[:3, 3]
+        row = Moved(
+            name,
+            float(Rotation.from_matrix(turn).magnitude()),
+            float(np.sqrt(np.mean(sigma[TURN] ** 2))),
+            float(np.linalg.norm(shift)),
+            float(np.sqrt(np.mean(sigma[SHIFT] ** 2))),
+            size - 1.0,
+            float(sigma[ZOOM][0]),
+            float(np.sqrt(np.mean(surprise**2))),
+        )
+        rows.append(row)
     return sorted(rows, key=lambda row: -row.surprise)
-
-
-def _row(
-    name: str, poses: tuple[Array, Array], zoom: float, sigma: Array, surprise: Array
-) -> Moved:
-    one, now = poses
-    return Moved(
-        name,
-        float(Rotation.from_matrix(now[:3, :3] @ one[:3, :3].T).magnitude()),
-        float(np.sqrt(np.mean(sigma[TURN] ** 2))),
-        float(np.linalg.norm(now[:3, 3] - one[:3, 3])),
-        float(np.sqrt(np.mean(sigma[SHIFT] ** 2))),
-        zoom,
-        float(sigma[ZOOM][0]),
-        float(np.sqrt(np.mean(surprise**2))),
-    )
 
 
 def _as_refined(believed: Scanner, found: Adjusted) -> Scanner:
@@ -181,7 +165,7 @@ def _as_refined(believed: Scanner, found: Adjusted) -> Scanner:
     covariance, body = found.covariance[:n, :n], found.covariance[n:, n:]
     across = found.covariance[:n, n:]
     # Against the object: where both lie in the world no edge tells.
-    told = covariance - across @ np.linalg.solve(body, across.T)
+    told = covariance - across @ np.linalg.pinv(body) @ across.T
     return replace(
         believed,
         cameras=cameras,

@@ -1,119 +1,96 @@
 """The fewest changes that explain what changing everything together explains.
 
 About the bundle adjustment of all poses and optics the sum of squares is a quadratic
-form, so that what one device alone, or the object, can explain is a small linear
-system; the best are adjusted again with nothing else free. What removes most with the
-fewest parameters is chosen; of what edges can't tell apart all is kept.
+form, so that what one device alone, or the object, can explain beside what is expected
+of all others is a small linear system; the best are adjusted again. What explains most
+is chosen; of what edges can't tell apart all is kept.
 """
 
 import numpy as np
 
 from planning.model.calibration_errors import CalibrationErrors
 from planning.verify.reconstruction.arrays import Array
-from planning.verify.reconstruction.scanner import Scanner
 
 from .adjustment import Adjusted, adjust, expected_of
 from .explanations import ROLES, Cause, Change, Explanation, misfit
 
 # What one fault may amount to.
-_FAULT, _FAULT_OF_OBJECT = CalibrationErrors(0.3, 0.3, 0.1), (0.3, 0.1, 0.1)
-# An explanation must leave no more than this share of the mismatch; where all devices
-# are off by what a calibration leaves, it must cost so much less than that.
-_MUST_LEAVE, _SURE = 0.5, 30.0
-# It is as good as another if it costs no more than this beyond it, or by this share.
-_AS_GOOD, _AS_GOOD_SHARE = 16.0, 0.01
-# Edges lie on their rings if they do within this share of the limit on the rms
-# distance, or so many times what changing everything leaves.
-_FINE_SHARE, _FINE_TIMES = 0.12, 1.25
-# Changes whose quadratic form is so many times the least are adjusted, the best few.
-_PROMISING, _MOST_ADJUSTED = 10.0, 8
-_MOST_CAUSES = 3
+FAULT = CalibrationErrors(0.3, 0.3, 0.1)
+# A change is named if it takes away so much of chi squared, and is as good as another
+# if it leaves no more than this beyond it; each parameter must earn its place.
+_TOLD, _EACH = 16.0, 4.0
+# The best few by the quadratic form, which errs by such a share, are adjusted.
+_PROMISING, _MOST_ADJUSTED = 2.0, 6
+MOST_CAUSES = 3
 Good = list[tuple[Change, Adjusted]]
 
 
 class Search:
     """For the fewest changes that explain what changing everything explains."""
 
-    def __init__(
-        self,
-        plan: Scanner,
-        every: Adjusted,
-        least: float,
-        body: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    ) -> None:
-        """Begin.
+    def __init__(self, every: Adjusted, errors: CalibrationErrors) -> None:
+        """Begin with what changing everything explains.
 
-        Args:
-            plan: With what its calibration leaves of each device.
-            every: What changing everything explains.
-            least: Mismatch that this leaves [m].
-            body: What the object may be off by without being to blame: turn [rad],
-                displacement [m], size as a share.
+        `errors` is what may be off of everything without being to blame.
         """
-        self._bundle, self._every = every.bundle, every
-        enough = _FINE_SHARE * plan.limits.check.max_rms_m
-        self._fine = max(enough, _FINE_TIMES * least)
-        # What isn't to blame is off by what its calibration leaves, and no more.
-        errors = plan.calibration or CalibrationErrors()
-        self._rest = expected_of(self._bundle, errors, body)
-        self._calibrated = errors != CalibrationErrors()
-        self._fault = expected_of(self._bundle, _FAULT, _FAULT_OF_OBJECT)
+        self._bundle = bundle = every.bundle
+        self._rest = expected_of(bundle, errors)
+        self._fault = expected_of(bundle, FAULT)
         self._unit = max(1.0, every.scatter)
-        rig = self._bundle.supposed
+        self._known: dict[frozenset[Change], Adjusted] = {}
         self._changes = [
             Change(role, (index,), moves)
             for role, moves_of in ROLES.items()
-            for index in range(len(getattr(rig, role)))
+            for index in range(len(getattr(bundle.supposed, role)))
             for moves in moves_of
-            if role != "objects" or not any(body)
         ]
-        self._chosen: list[Change] = []
-        self._left_m = [misfit(self._bundle.evidence, rig)]
-        self._good: Good = []
-        self.found = self._adjusted(self._chosen)
-        while len(self._chosen) < _MOST_CAUSES and self._next():
-            pass
+        n = len(bundle.evidence)
+        slopes = every.slopes(every.z)[:n] / every.expected
+        wanted = slopes @ every.x - every.residuals(every.z)[:n]
+        self._least = float(np.sum(every.residuals(every.z)[:n] ** 2))
+        self._form = slopes.T @ slopes, slopes.T @ wanted, float(wanted @ wanted)
 
-    def _next(self) -> bool:
-        """Choose one change more; whether one was called for."""
-        good = self._as_good(self._chosen)
-        change, found = good[0]
-        before, left = self._left_m[-1], self._left(found)
-        if self._calibrated:
-            named = self.found.cost - found.cost > _SURE
-        else:
-            named = before > self._fine and left < _MUST_LEAVE * before
-        if named:
-            self._chosen.append(change)
-            self._left_m.append(left)
-            self._good, self.found = good, found
-        return named
-
-    def causes(self) -> list[Cause]:
-        """Return one after the other what leaves least with those before it."""
+    def causes(self, most: int = MOST_CAUSES) -> tuple[list[Cause], Adjusted]:
+        """Return what is to blame, what explains most first, and all adjusted so."""
+        chosen: list[Change] = []
+        while len(chosen) < most:
+            best, found = self._as_good(chosen)[0]
+            if self._adjusted(chosen).cost - found.cost < _TOLD:
+                break
+            # What this explains better isn't to blame any more.
+            chosen = [c for c in chosen if self._worth(c, [*chosen, best])] + [best]
+        rig, found = self._bundle.supposed, self._adjusted(chosen)
+        stages = [
+            rig,
+            *(self._adjusted(chosen[: k + 1]).supposed for k in range(len(chosen))),
+        ]
+        left = [misfit(self._bundle.evidence, one) for one in stages]
         causes: list[Cause] = []
-        rig, every = self._bundle.supposed, self._chosen
-        for k, change in enumerate(every):
-            good = self._good
-            if k < len(every) - 1:
-                good = self._as_good([*every[:k], *every[k + 1 :]])
-            good = [one for one in good if not one[0].repeats(change)]
-            left = self._left_m[k], self._left_m[k + 1]
+        for k, change in enumerate(chosen):
+            good = self._as_good([*chosen[:k], *chosen[k + 1 :]])
+            others = [one for one in good if not one[0].repeats(change)]
             causes.append(
                 tuple(
-                    Explanation(one, rig, by.supposed, left)
-                    for one, by in [(change, self.found), *good]
+                    Explanation(one, rig, by.supposed, (left[k], left[k + 1]))
+                    for one, by in [(change, found), *others]
                 )
             )
-        return causes
+        return causes, found
 
-    def _left(self, adjusted: Adjusted) -> float:
-        return misfit(self._bundle.evidence, adjusted.supposed)
+    def _worth(self, change: Change, chosen: list[Change]) -> bool:
+        others = [one for one in chosen if one != change]
+        gain = self._adjusted(others).cost - self._adjusted(chosen).cost
+        return gain >= _TOLD
 
     def _adjusted(self, changes: list[Change]) -> Adjusted:
-        expected = self._expected(changes)
-        start, _ = self._by_form(changes)
-        return adjust(self._bundle, expected, start=start, unit=self._unit)
+        key = frozenset(changes)
+        if key not in self._known:
+            start, _ = self._by_form(changes)
+            expected = self._expected(changes)
+            self._known[key] = adjust(
+                self._bundle, expected, start=start, unit=self._unit
+            )
+        return self._known[key]
 
     def _expected(self, changes: list[Change]) -> Array:
         expected = self._rest.copy()
@@ -123,37 +100,26 @@ class Search:
         return expected
 
     def _as_good(self, chosen: list[Change]) -> Good:
-        """Return the simplest of the best further changes, and others as good.
-
-        None that contains another one.
-        """
+        """Return the best further change, and others as good that don't contain it."""
         others = [c for c in self._changes if not any(c.repeats(k) for k in chosen)]
-        forms = [self._by_form([*chosen, change])[1] for change in others]
-        most = _PROMISING * min(forms) + _AS_GOOD
+        forms = [self._by_form([*chosen, c])[1] + _EACH * c.size for c in others]
+        most = min(forms) + _PROMISING * (min(forms) - self._least) + 2.0 * _TOLD
+        most = max(min(forms), min(most, self._by_form(chosen)[1] - 0.5 * _TOLD))
         order = [k for k in np.argsort(forms).tolist() if forms[k] <= most]
-        tried: Good = [
-            (others[k], self._adjusted([*chosen, others[k]]))
-            for k in order[:_MOST_ADJUSTED]
-        ]
-        least = min(adjusted.cost for _, adjusted in tried)
-        most = least + max(_AS_GOOD, _AS_GOOD_SHARE * least)
-        tried = [one for one in tried if one[1].cost <= most]
-        tried.sort(key=lambda one: (one[0].size, one[1].cost))
-        simplest: Good = []
+        promising = [others[k] for k in order[:_MOST_ADJUSTED]]
+        tried = [(c, self._adjusted([*chosen, c])) for c in promising]
+        tried.sort(key=lambda one: one[1].cost + _EACH * one[0].size)
+        good: Good = []
         for change, adjusted in tried:
-            if not any(change.repeats(other) for other, _ in simplest):
-                simplest.append((change, adjusted))
-        return simplest
+            as_good = adjusted.cost <= tried[0][1].cost + _TOLD
+            if as_good and not any(change.repeats(other) for other, _ in good):
+                good.append((change, adjusted))
+        return good
 
     def _by_form(self, changes: list[Change]) -> tuple[Array, float]:
         """Return changes by the quadratic form about what explains most, their cost."""
-        slopes, off = self._every.weighed
+        squares, wanted, before = self._form
         expected = self._expected(changes)
-        free = expected > 0.0
-        wanted = slopes @ self._every.x - off
-        scaled = np.vstack([(slopes * expected)[:, free], np.eye(int(free.sum()))])
-        wanted = np.concatenate([wanted, np.zeros(int(free.sum()))])
-        z = np.linalg.lstsq(scaled, wanted, rcond=None)[0]
-        x = np.zeros(len(expected))
-        x[free] = expected[free] * z
-        return x, float(np.sum((wanted - scaled @ z) ** 2))
+        squares = expected[:, None] * squares * expected + np.eye(len(expected))
+        z = np.linalg.solve(squares, expected * wanted)
+        return expected * z, before - float(expected * wanted @ z)

@@ -24,8 +24,8 @@ from planning.verify.reconstruction.scanner import Scanner
 Role = Literal["cameras", "projectors", "objects"]
 # Points in the world [m] and unit normals there, shape (n, 3), NaN where rays miss.
 Places = tuple[Array, Array]
-# Edges of each pair of devices that are looked at.
-EDGES_A_PAIR = 240
+# Edges of each pair of devices that are looked at, and of all pairs.
+_EDGES_A_PAIR, _EDGES = 400, 20_000
 # Incidence of light beyond which edges smear: formulation.md section 2 [rad].
 GRAZING = np.deg2rad(70.0)
 # Pairs with fewer edges say nothing.
@@ -117,8 +117,9 @@ class Evidence(Columns):
         return cls(pixels, np.zeros(n), np.full(n, c), np.full(n, p), np.zeros(n))
 
     @classmethod
-    def of(cls, plan: Scanner, decoded: Pairs, most: int = EDGES_A_PAIR) -> Self:
-        """Take so many edges of each pair, evenly; none with disordered labels."""
+    def of(cls, plan: Scanner, decoded: Pairs) -> Self:
+        """Take edges of each pair, evenly; none with disordered labels."""
+        most = min(_EDGES_A_PAIR, _EDGES // max(1, len(decoded)))
         parts = [cls.at(np.zeros((0, 2)), 0, 0)]
         for (p, c), pair in decoded:
             edges = pair.edges
