@@ -11,6 +11,7 @@ written by hand and as exact as CasADi's.
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -131,16 +132,9 @@ def adjust(
         most = float(np.quantile(off, _MOST_EDGES))
         rounds.insert(0, (max(_OUTLYING, most), _NEAR))
     for c, near in rounds if len(z) else ():
-        z = least_squares(
-            found.residuals,
-            z,
-            found.slopes,
-            method="lm",
-            xtol=near,
-            ftol=near,
-            max_nfev=_MOST_STEPS,
-            args=(c,),
-        ).x
+        options: dict[str, Any] = {"method": "lm", "max_nfev": _MOST_STEPS}
+        options |= {"xtol": near, "ftol": near, "jac": found.slopes, "args": (c,)}
+        z = least_squares(found.residuals, z, **options).x
     return Adjusted(bundle, expected, unit, found.changes(z))
 
 

@@ -16,7 +16,7 @@ from typing import TypeVar
 
 import numpy as np
 from scipy.linalg import block_diag, expm
-from scipy.sparse import csr_array
+from scipy.sparse import csc_array
 from scipy.spatial.transform import Rotation
 
 from planning.verify.reconstruction.arrays import Array, Indices
@@ -25,7 +25,7 @@ from planning.verify.reconstruction.calibration import (
     ProjectorCalibration,
 )
 
-from .supposed import Evidence, Places, Role, Supposed, offsets, places
+from .supposed import Evidence, Places, Role, Supposed, mismatches, places
 
 # Of each body in its own axes: turn [rad], displacement [m]; then of a device the focal
 # length's change as a share and the principal point's [px], of the object its size's.
@@ -35,6 +35,8 @@ BIASED_PX = 0.015
 _OF_DEVICE, _OF_OBJECT = 9, 7
 # An edge that runs along its viewing ray isn't surer than this share of the median.
 _LEAST_SLOPE = 0.2
+# A patch of surface is so many ring gaps wide.
+_PATCH_TAU = 2.0
 _Device = TypeVar("_Device", CameraCalibration, ProjectorCalibration)
 
 
@@ -45,8 +47,6 @@ class Bundle:
     Attributes:
         evidence: The edges.
         supposed: How everything is supposed to stand.
-        patch: Of the object's surface that each edge lies on, shape (n,); None: the
-            object is the mesh.
         relief_m: Standard deviation of how far each patch lies off the mesh [m]. What
             edges of a patch say of that together is taken out of them, so that with a
             large one only edges of different pairs tell against each other.
@@ -54,7 +54,6 @@ class Bundle:
 
     evidence: Evidence
     supposed: Supposed
-    patch: Indices | None = None
     relief_m: float = 0.0
     _last: dict[bytes, tuple[Supposed, Places]] = field(
         default_factory=dict, init=False, repr=False
@@ -99,8 +98,8 @@ class Bundle:
         )
 
     def offsets(self, x: Array) -> Array:
-        """Return rho - R in units of sigma after changes, NaN as `offsets`, (n,)."""
-        return offsets(self.evidence, *self._standing(x))[0] / self.sigma
+        """Return rho - R in units of sigma after changes, NaN as `mismatches`."""
+        return mismatches(self.evidence, *self._standing(x))[0] / self.sigma
 
     def slopes(self, x: Array) -> Array:
         """Return their derivatives by the changes, (n, n_unknowns)."""
@@ -117,44 +116,41 @@ class Bundle:
         return self._last[key]
 
     @cached_property
-    def _by_relief(self) -> tuple[Array, Array]:
-        """What an offset of a patch does to edges (n,), and its squares' sum (n,)."""
+    def _patches(self) -> tuple[csc_array, Array]:
+        """What an offset of a patch does to edges: (n, k) of norm 1, the norms (k,).
+
+        A patch is a cube of space; edges that miss the mesh are in one of their own.
+        """
+        points, _ = places(self.evidence, self.supposed)
+        size = _PATCH_TAU * self.supposed.plan.limits.check.tau_m
+        cube = np.nan_to_num(np.floor(points / size), nan=np.inf)
+        _, patch = np.unique(cube, axis=0, return_inverse=True)
         rising = np.nan_to_num(self._first[2] / self.sigma)
-        assert self.patch is not None
-        squares = np.bincount(self.patch, rising**2).astype(np.float64)
-        return rising, squares[self.patch]
+        norm = np.sqrt(np.bincount(patch, rising**2))
+        unit = rising / np.where(norm > 0.0, norm, 1.0)[patch]
+        return csc_array((unit, (np.arange(len(unit)), patch))), norm
 
     def apart_from_relief(self, values: Array) -> Array:
         """Return offsets or slopes (n, ...) less what offsets of patches explain.
 
-        With l the slopes by a patch's offset h, h of deviation s, and a as below, the
-        sum of the squares of ``r - a l (l.r)`` is the least of ``|r - l h|^2 + h^2 /
-        s^2``::
-
-            a = (1 - 1 / sqrt(1 + s^2 l.l)) / l.l
+        With l the slopes by a patch's offset h, h of deviation s, and u = l / |l|, the
+        sum of the squares of ``r - u (u.r) (1 - 1 / sqrt(1 + s^2 l.l))`` is the least
+        of ``|r - l h|^2 + h^2 / s^2``.
         """
-        if self.patch is None or not self.relief_m > 0.0:
+        if not self.relief_m > 0.0:
             return values
-        rising, squares = self._by_relief
-        with np.errstate(invalid="ignore", divide="ignore"):
-            a = (1.0 - 1.0 / np.sqrt(1.0 + self.relief_m**2 * squares)) / squares
-        a, columns = np.where(squares > 0.0, a, 0.0), values.reshape(len(values), -1)
-        which = np.arange(len(values)), self.patch
-        of_patch = csr_array((rising, which), (len(values), int(self.patch.max()) + 1))
-        taken = a[:, None] * (of_patch @ (of_patch.T @ columns))
-        return (columns - taken).reshape(values.shape)
+        unit, norm = self._patches
+        share = 1.0 - 1.0 / np.hypot(1.0, self.relief_m * norm)
+        return values - unit.multiply(share[None]) @ (unit.T @ values)
 
     def relief(self, off: Array) -> float:
         """Return the deviation of patches [m] that offsets of edges (n,) ask for.
 
         By the median over patches of two edges or more, which a dent doesn't move.
         """
-        assert self.patch is not None
-        known = np.isfinite(off)
-        patch, rising = self.patch[known], self._by_relief[0][known]
-        squares = np.bincount(patch, rising**2)
-        measured = (np.bincount(patch) > 1) & (squares > 0.0)
-        heights = np.bincount(patch, rising * off[known])[measured] / squares[measured]
+        unit, norm = self._patches
+        measured = (np.diff(unit.indptr) > 1) & (norm > 0.0)
+        heights = (unit.T @ np.nan_to_num(off))[measured] / norm[measured]
         return 1.4826 * float(np.median(np.abs(heights))) if len(heights) else 0.0
 
     @cached_property

@@ -13,12 +13,10 @@ from planning.verify.reconstruction.calibration import (
 )
 from planning.verify.reconstruction.scanner import Scanner
 
-from .explanations import Cause, Explanation
+from .explanations import Cause, Explanation, Moves
 from .supposed import GRAZING
 
 _MM = 1e3
-# Turns below this aren't worth a word [rad].
-_NO_TURN = np.deg2rad(0.005)
 # An axis that passes the object by more than this share of its distance isn't aimed.
 _MOST_ASIDE = 0.5
 _Device = TypeVar("_Device", bound=DeviceCalibration)
@@ -50,7 +48,7 @@ def _looks(explanation: Explanation, plan: Scanner) -> str:
         return f"{names[0]} looks as if its focal length were {_per_cent(by)} {longer}"
     after = untwisted(before, after)
     away = float(np.linalg.norm(states[0].objects[0].centre - before.centre))
-    looks = f"{names[0]} looks as if it {_displaced(before, after, away)}"
+    looks = f"{names[0]} looks as if it {_displaced(change.moves, before, after, away)}"
     if change.role == "cameras":
         return looks + _too_wide(names[0], after, plan)
     return looks + _grazing(before, after, plan)
@@ -65,28 +63,32 @@ def _object_looks(explanation: Explanation) -> str:
     if "shift" in explanation.change.moves:
         shift = float(np.linalg.norm(after.centre - before.centre))
         words.append(f"moved by {_millimetres(shift)}")
+    if "turn" in explanation.change.moves:
         turn = _angle(before.world_from_device, after.world_from_device)
-        if turn > _NO_TURN:
-            words.append(f"turned by {_two_digits(np.rad2deg(turn))} degrees")
+        words.append(f"turned by {_two_digits(np.rad2deg(turn))} degrees")
     return f"the object looks {', '.join(words)} against the mesh"
 
 
-def _displaced(before: DeviceCalibration, after: DeviceCalibration, away: float) -> str:
+def _displaced(
+    moves: Moves, before: DeviceCalibration, after: DeviceCalibration, away: float
+) -> str:
+    """Say what is to blame; what is as expected beside it isn't said."""
     poses = before.world_from_device, after.world_from_device
-    moved, angle = float(np.linalg.norm(after.centre - before.centre)), _angle(*poses)
     words: list[str] = []
-    if angle > _NO_TURN:
+    if "turn" in moves:
         one, other = (pose[:3, 2] for pose in poses)
         cosine = max(float(one @ other), 1e-3)
         tangent = float(np.linalg.norm(np.cross(one, other))) / cosine
         least = "at least " * isinstance(before, ProjectorCalibration)
-        turned = f"were turned by {least}{_two_digits(np.rad2deg(angle))} degrees"
+        angle = _two_digits(np.rad2deg(_angle(*poses)))
+        turned = f"were turned by {least}{angle} degrees"
         if tangent < _MOST_ASIDE:
             turned += f" (aimed {_millimetres(away * tangent)} off at the object)"
         words.append(turned)
-    if moved > 0.0:
+    if "shift" in moves:
+        moved = float(np.linalg.norm(after.centre - before.centre))
         words.append(f"stood {_millimetres(moved)} from its place")
-    return " and ".join(words) or "were not moved"
+    return " and ".join(words)
 
 
 def untwisted(before: _Device, after: _Device) -> _Device:

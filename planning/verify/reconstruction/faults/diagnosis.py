@@ -19,8 +19,10 @@ from .supposed import Evidence, Supposed
 MOUNTED = CalibrationErrors(8e-3, 8e-3, 5e-3, 5.0)
 # Where no calibration is stated: as planned, but for what biased edges feign.
 AS_PLANNED = CalibrationErrors(3e-5, 3e-5, 3e-5)
-# Edges lie on their rings if they do within this share of the limit on the rms distance.
+# Edges lie on their rings within this share of the limit on the rms distance.
 _FINE_SHARE = 0.12
+# Edges scatter from so many deviations of their noise on.
+_SCATTERED = 1.5
 _MM = 1e3
 
 
@@ -47,7 +49,8 @@ def diagnose(plan: Scanner, evidence: Evidence) -> Diagnosis:
     before, least = (
         misfit(evidence, one) for one in (every.bundle.supposed, every.supposed)
     )
-    if enough < before and least <= MUST_LEAVE * before:
+    shifted = least <= MUST_LEAVE * before or every.scatter < _SCATTERED
+    if enough < before and shifted:
         search = Search(every, stated(plan, AS_PLANNED))
         causes += search.causes(MOST_CAUSES - len(causes))[0]
     if not causes:

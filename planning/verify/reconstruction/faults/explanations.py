@@ -19,7 +19,12 @@ Move = Literal["turn", "shift", "zoom", "swap"]
 Moves = tuple[Move, ...]
 _PARTS = {"turn": TURN, "shift": SHIFT, "zoom": ZOOM}
 _OF_DEVICE: tuple[Moves, ...] = ("zoom",), ("turn",), ("shift",), ("turn", "shift")
-_OF_OBJECT: tuple[Moves, ...] = ("zoom",), ("turn", "shift"), ("turn", "shift", "zoom")
+_OF_OBJECT: tuple[Moves, ...] = (
+    ("zoom",),
+    ("shift",),
+    ("turn", "shift"),
+    ("turn", "shift", "zoom"),
+)
 # What may change of each.
 ROLES: dict[Role, tuple[Moves, ...]] = {
     "cameras": _OF_DEVICE,
@@ -76,7 +81,7 @@ Cause = tuple[Explanation, ...]
 
 def misfit(evidence: Evidence, rig: Supposed, cap_m: float = _CAP_M) -> float:
     """Return the mismatch of edges [m], mean over the pairs."""
-    off = np.abs(mismatches(evidence, rig, places(evidence, rig)))
+    off = np.abs(mismatches(evidence, rig, places(evidence, rig))[1])
     off = np.minimum(np.where(np.isfinite(off), off, cap_m), cap_m)
     pairs = evidence.projector * len(rig.cameras) + evidence.camera
     return float(np.mean([_sound(off[pairs == pair]) for pair in np.unique(pairs)]))

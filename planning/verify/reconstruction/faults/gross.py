@@ -79,6 +79,6 @@ def _elsewhere(
         expected[columns] = expected_of(bundle, FAULT)[columns]
         return adjust(bundle, expected).supposed
 
-    turns = Rotation.random(_PLACES, random_state=0).as_matrix()
+    turns = Rotation.random(_PLACES, rng=np.random.default_rng(0)).as_matrix()
     starts = sorted(map(turned, [np.eye(3), *turns]), key=left)[:_FITTED]
     return fitted(evidence, min((fitted(few, one) for one in starts), key=left))

@@ -7,7 +7,7 @@ import numpy as np
 from geometry.rays.proximity import closest_points
 from planning.verify.reconstruction.arrays import Indices, Mask
 from planning.verify.reconstruction.cloud import Cloud
-from planning.verify.reconstruction.decode.decode import PairIndex, Pairs
+from planning.verify.reconstruction.decode.decode import Pairs
 from planning.verify.reconstruction.scanner import Scanner
 
 from .supposed import GRAZING, Evidence, Supposed, mismatches, places
@@ -27,23 +27,19 @@ _LEAST_SHARE = 0.05
 def where_inaccurate(plan: Scanner, cloud: Cloud) -> str:
     """Say what the points that are off have in common, nothing being displaced."""
     limit, mesh = plan.limits.check.max_rms_m, plan.mesh
-    few = Cloud.join(
-        [
-            cloud.take((cloud.projector == p) & (cloud.camera == c)).thinned(
-                _POINTS_A_PAIR
-            )
-            for p in range(len(plan.projectors))
-            for c in range(len(plan.cameras))
-        ]
-    )
+    each = {
+        (p, c): cloud.take((cloud.projector == p) & (cloud.camera == c))
+        for p in range(len(plan.projectors))
+        for c in range(len(plan.cameras))
+    }
+    each = {pair: one.thinned(_POINTS_A_PAIR) for pair, one in each.items() if len(one)}
+    few = Cloud.join([*each.values()])
     nearest = closest_points(mesh, few.points)
     error = np.abs(nearest.distances)
-    pairs = sorted({*zip(few.projector.tolist(), few.camera.tolist(), strict=True)})
-    medians = {
-        (p, c): float(np.median(error[(few.projector == p) & (few.camera == c)]))
-        for p, c in pairs
-    }
-    off = {pair for pair, median in medians.items() if median > limit}
+    ends = np.cumsum([len(one) for one in each.values()])[:-1]
+    split = zip(each, np.split(error, ends), strict=True)
+    medians = {pair: float(np.median(own)) for pair, own in split}
+    off = [pair for pair, median in medians.items() if median > limit]
     if len(off) == len(medians):
         return (
             f"every pair of devices is off (median error "
@@ -63,7 +59,8 @@ def where_inaccurate(plan: Scanner, cloud: Cloud) -> str:
             "most points of every pair are accurate: the rest, or the surface that is "
             "missing, lies where few rings reach"
         )
-    return _name_devices(off, medians, plan)
+    names = ", ".join(f"{plan.name(pair)} {_MM * medians[pair]:.3f} mm" for pair in off)
+    return f"some pairs of devices are off and others aren't (median error): {names}"
 
 
 def _grazing(plan: Scanner, cloud: Cloud, faces: Indices, far: Mask) -> list[str]:
@@ -78,29 +75,6 @@ def _grazing(plan: Scanner, cloud: Cloud, faces: Indices, far: Mask) -> list[str
                 angle = np.rad2deg(np.arccos(np.clip(lit, -1.0, 1.0)))
                 names.append(f"{device.id} at {angle:.0f} degrees")
     return names
-
-
-def _name_devices(
-    off: set[PairIndex], medians: dict[PairIndex, float], plan: Scanner
-) -> str:
-    """Name the devices whose every pair is off, if they account for all that is."""
-    right = medians.keys() - off
-    projectors = {p for p, _ in off} - {p for p, _ in right}
-    cameras = {c for _, c in off} - {c for _, c in right}
-    none: set[int] = set()
-    for some, others in ((projectors, none), (none, cameras), (projectors, cameras)):
-        if all(p in some or c in others for p, c in off):
-            names = [plan.projectors[p].id for p in sorted(some)]
-            names += [plan.cameras[c].id for c in sorted(others)]
-            verb = "differs" if len(names) == 1 else "differ"
-            return (
-                f"{' and '.join(names)} {verb} from the plan in pose or optics: median "
-                f"error {_MM * np.median([medians[pair] for pair in off]):.3f} mm, of "
-                f"the other pairs "
-                f"{_MM * np.median([medians[pair] for pair in right]):.3f} mm"
-            )
-    pairs = ", ".join(plan.name(pair) for pair in sorted(off))
-    return f"some pairs of devices are off and others aren't: {pairs}"
 
 
 def wrong_roots(plan: Scanner, decoded: Pairs) -> list[str]:
@@ -118,7 +92,7 @@ def wrong_roots(plan: Scanner, decoded: Pairs) -> list[str]:
         radii = plan.projectors[p].pattern.radii[cloud.ring]
         evidence = replace(Evidence.at(cloud.pixels, p, c), radii=radii)
         at = places(evidence, supposed)
-        off = np.abs(mismatches(evidence, supposed, at))
+        off = np.abs(mismatches(evidence, supposed, at)[1])
         apart = np.linalg.norm(cloud.points - at[0], axis=1)
         wrong = (off < _ON_RING_SHARE * limit) & (apart > _ELSEWHERE_SHARE * limit)
         if np.mean(wrong) > _LEAST_SHARE:

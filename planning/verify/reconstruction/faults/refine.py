@@ -1,9 +1,9 @@
 """A rig refined over the edges of an object, before the clouds are merged.
 
 Edges of all pairs against the mesh, and, where the object isn't the mesh, against each
-other: how far it differs is an unknown of every patch of its surface. What a calibration
-leaves is expected of the devices, and of where the object stands and how large it is,
-which no edge tells apart from where all devices stand; what is to blame is free.
+other: how far it differs is an unknown of every patch of its surface. Expected of the
+devices is what a calibration leaves, and so much of where the object stands and of its
+size, which no edge tells apart from where all devices stand; what is to blame is free.
 """
 
 from dataclasses import replace
@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from planning.model.calibration_errors import CalibrationErrors
-from planning.verify.reconstruction.arrays import Indices
+from planning.verify.reconstruction.calibration import ProjectorCalibration
 from planning.verify.reconstruction.check.refined_rig import Moved, RefinedRig
 from planning.verify.reconstruction.decode.decode import Decoded, Pairs, measure_edges
 from planning.verify.reconstruction.scanner import Scanner
@@ -22,12 +22,10 @@ from .bundle import BIASED_PX, SHIFT, TURN, ZOOM, Bundle, by_body
 from .cause_words import in_words, untwisted
 from .diagnosis import MOUNTED, reachable, stated
 from .search import Search
-from .supposed import Evidence, Supposed, places
+from .supposed import Evidence, Object, Supposed
 
 # What a good calibration leaves of a device, where none is stated.
 CALIBRATED = CalibrationErrors(angle=1e-4, position_m=5e-5, focal=5e-4)
-# A patch of surface is so many ring gaps wide.
-_PATCH_TAU = 2.0
 # The relief that a search begins with [m], and its rounds.
 _RELIEF_M, _ROUNDS = 1e-3, 4
 _LEAST_RELIEF_M = 1e-7
@@ -44,8 +42,7 @@ def refine(believed: Scanner, pairs: Pairs) -> RefinedRig | None:
     if len(evidence) == 0:
         return None
     every, causes = reachable(believed, evidence)
-    start = every.bundle.supposed
-    bundle = Bundle(evidence, start, _patches(evidence, start), _RELIEF_M)
+    bundle = Bundle(evidence, every.bundle.supposed, _RELIEF_M)
     everything = expected_of(bundle, MOUNTED)
     every = adjust(bundle, everything)
     for _ in range(_ROUNDS):
@@ -91,47 +88,30 @@ def remeasured(design: Scanner, rig: Scanner, pairs: Pairs) -> Pairs:
     return [((p, c), again(p, c, pair)) for (p, c), pair in pairs]
 
 
-def _patches(evidence: Evidence, rig: Supposed) -> Indices:
-    """Return which cube of space each edge lies in, all that miss the mesh in one."""
-    at, _ = places(evidence, rig)
-    size = _PATCH_TAU * rig.plan.limits.check.tau_m
-    known = np.isfinite(at[:, 0])
-    cube = np.floor(np.where(known[:, None], at, 0.0) / size).astype(np.int64)
-    return np.unique(np.column_stack([known, cube]), axis=0, return_inverse=True)[
-        1
-    ].ravel()
-
-
 def _moved(
     believed: Scanner, refined: Scanner, found: Adjusted, errors: CalibrationErrors
 ) -> list[Moved]:
     """Return what moved by how much, the largest surprise first."""
-    devices = zip(
-        believed.cameras + believed.projectors,
-        refined.cameras + refined.projectors,
-        strict=True,
-    )
     (mesh,), (body,) = Supposed.of(believed).objects, found.supposed.objects
-    bodies = [
-        (one.id, one, now, float(now.matrix[0, 0] / one.matrix[0, 0]))
-        for one, now in devices
-    ]
+    before = (*believed.cameras, *believed.projectors, mesh)
+    after = (*refined.cameras, *refined.projectors, body)
     expected = expected_of(found.bundle, errors)
     surprises = by_body(found.x / np.where(expected > 0.0, expected, np.inf))
     sigmas = by_body(np.sqrt(np.diag(found.covariance)))
     rows: list[Moved] = []
-    for (name, one, now, size), sigma, surprise in zip(
-        [*bodies, ("object", mesh, body, body.scale)], sigmas, surprises, strict=True
-    ):
+    for one, now, sigma, surprise in zip(before, after, sigmas, surprises, strict=True):
         turn = now.world_from_device[:3, :3] @ one.world_from_device[:3, :3].T
-        shift = (now.world_from_device - one.world_from_device)[:3, 3]
+        if isinstance(now, Object) or isinstance(one, Object):
+            name, zoom = "object", body.scale
+        else:
+            name, zoom = one.id, float(now.matrix[0, 0] / one.matrix[0, 0])
         row = Moved(
             name,
             float(Rotation.from_matrix(turn).magnitude()),
             float(np.sqrt(np.mean(sigma[TURN] ** 2))),
-            float(np.linalg.norm(shift)),
+            float(np.linalg.norm(now.centre - one.centre)),
             float(np.sqrt(np.mean(sigma[SHIFT] ** 2))),
-            size - 1.0,
+            zoom - 1.0,
             float(sigma[ZOOM][0]),
             float(np.sqrt(np.mean(surprise**2))),
         )
@@ -146,30 +126,20 @@ def _as_refined(believed: Scanner, found: Adjusted) -> Scanner:
         replace(one, world_from_device=now.world_from_device, matrix=now.matrix)
         for one, now in zip(believed.cameras, rig.cameras, strict=True)
     )
-    lamps = [
-        untwisted(*two) for two in zip(believed.projectors, rig.projectors, strict=True)
-    ]
-    projectors = tuple(
-        replace(
-            one,
-            world_from_device=now.world_from_device,
-            world_from_ring=now.world_from_device
-            @ np.linalg.inv(one.world_from_device)
-            @ one.world_from_ring,
-            matrix=now.matrix,
-            drawn_for=one.drawn_matrix,
-        )
-        for one, now in zip(believed.projectors, lamps, strict=True)
-    )
+    projectors: list[ProjectorCalibration] = []
+    for one, now in zip(believed.projectors, rig.projectors, strict=True):
+        pose = untwisted(one, now).world_from_device
+        rings = pose @ np.linalg.inv(one.world_from_device) @ one.world_from_ring
+        moved = replace(one, world_from_device=pose, world_from_ring=rings)
+        projectors.append(replace(moved, matrix=now.matrix, drawn_for=one.drawn_matrix))
     n = found.bundle.columns("objects", 0)[0]
-    covariance, body = found.covariance[:n, :n], found.covariance[n:, n:]
-    across = found.covariance[:n, n:]
+    across, body = found.covariance[:n, n:], found.covariance[n:, n:]
     # Against the object: where both lie in the world no edge tells.
-    told = covariance - across @ np.linalg.pinv(body) @ across.T
+    told = found.covariance[:n, :n] - across @ np.linalg.pinv(body) @ across.T
     return replace(
         believed,
         cameras=cameras,
-        projectors=projectors,
+        projectors=tuple(projectors),
         calibration=None,
         covariance=told,
     )

@@ -107,7 +107,7 @@ class Search:
         most = max(min(forms), min(most, self._by_form(chosen)[1] - 0.5 * _TOLD))
         order = [k for k in np.argsort(forms).tolist() if forms[k] <= most]
         promising = [others[k] for k in order[:_MOST_ADJUSTED]]
-        tried = [(c, self._adjusted([*chosen, c])) for c in promising]
+        tried: Good = [(c, self._adjusted([*chosen, c])) for c in promising]
         tried.sort(key=lambda one: one[1].cost + _EACH * one[0].size)
         good: Good = []
         for change, adjusted in tried:

@@ -144,8 +144,10 @@ def places(evidence: Evidence, supposed: Supposed) -> Places:
     return points, normals
 
 
-def mismatches(evidence: Evidence, supposed: Supposed, at: Places) -> Array:
-    """Return how far edges at places are off their rings [m], shape (n,).
+def mismatches(
+    evidence: Evidence, supposed: Supposed, at: Places
+) -> tuple[Array, Array]:
+    """Return how far edges at places are off their rings: rho - R, and [m], (n,) each.
 
     NaN where the object is missed or faces away from the light.
 
@@ -153,25 +155,15 @@ def mismatches(evidence: Evidence, supposed: Supposed, at: Places) -> Array:
     coordinate of the projector's pixel that lights X (as the patterns were drawn), the
     mismatch is ``(rho - R) z / sqrt(1 + R^2)``, in parallel light ``rho - R``.
     """
-    mismatch, depth = offsets(evidence, supposed, at)
+    offset, across = np.full((2, len(evidence)), np.nan)
     for p in np.unique(evidence.projector):
-        lit_by = evidence.projector == p
-        mismatch[lit_by] = supposed.plan.projectors[p].light.across_m(
-            mismatch[lit_by], evidence.radii[lit_by], depth[lit_by]
-        )
-    return mismatch
-
-
-def offsets(evidence: Evidence, supposed: Supposed, at: Places) -> tuple[Array, Array]:
-    """Return rho - R of edges, NaN as for `mismatches`, and depths z [m], (n,) each."""
-    offset, depth = np.full((2, len(evidence)), np.nan)
-    for p in np.unique(evidence.projector):
-        lit_by = evidence.projector == p
+        lit_by, radii = evidence.projector == p, evidence.radii[evidence.projector == p]
         projector, design = supposed.projectors[p], supposed.plan.projectors[p]
         points, normals = (one[lit_by] for one in at)
         with np.errstate(invalid="ignore", divide="ignore"):
-            pixels, depth[lit_by] = projector.panel(points)
+            pixels, depth = projector.panel(points)
             rho = np.hypot(*design.ring_plane(pixels).T)
             lit = projector.incidence_cosine(points, normals) > 0.0
-            offset[lit_by] = np.where(lit, rho - evidence.radii[lit_by], np.nan)
-    return offset, depth
+            offset[lit_by] = np.where(lit, rho - radii, np.nan)
+            across[lit_by] = design.light.across_m(offset[lit_by], radii, depth)
+    return offset, across
