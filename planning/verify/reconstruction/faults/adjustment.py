@@ -145,9 +145,9 @@ def _curbed(off: Array, c: float) -> tuple[Array, Array]:
 
 
 def expected_of(bundle: Bundle, errors: CalibrationErrors) -> Array:
-    """Return what errors of every body are expected of each unknown, (n_unknowns,).
+    """Return what errors of every device are expected of each unknown, (n_unknowns,).
 
-    The object's place and size are as well known as a device's place and focal length.
+    Of the object as of a device, its size as a focal length.
     """
     of_each = (errors.about_axis, errors.along_axis_m, errors.focal)
     of_body = np.repeat((*of_each, errors.along_line_px), (3, 3, 1, 2))

@@ -2,8 +2,8 @@
 
 Edges of all pairs against the mesh, and, where the object isn't the mesh, against each
 other: how far it differs is an unknown of every patch of its surface. Expected of the
-devices is what a calibration leaves, and so much of where the object stands and of its
-size, which no edge tells apart from where all devices stand; what is to blame is free.
+devices is what a calibration leaves; what is to blame is free, be it the object, which
+otherwise says where in the world both stand: no edge does.
 """
 
 from dataclasses import replace

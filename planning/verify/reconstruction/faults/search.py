@@ -31,10 +31,12 @@ class Search:
     def __init__(self, every: Adjusted, errors: CalibrationErrors) -> None:
         """Begin with what changing everything explains.
 
-        `errors` is what may be off of everything without being to blame.
+        `errors` is what devices may be off by without being to blame. The object may
+        not: its mesh is what the world is named by, and no edge tells where both are.
         """
         self._bundle = bundle = every.bundle
         self._rest = expected_of(bundle, errors)
+        self._rest[bundle.columns("objects", 0)] = 0.0
         self._fault = expected_of(bundle, FAULT)
         self._unit = max(1.0, every.scatter)
         self._known: dict[frozenset[Change], Adjusted] = {}
