@@ -17,6 +17,8 @@ from .explanations import Cause, Explanation, Moves
 from .supposed import GRAZING
 
 _MM = 1e3
+# Turns of the object below this aren't worth a word [rad].
+_NO_TURN = np.deg2rad(0.005)
 # An axis that passes the object by more than this share of its distance isn't aimed.
 _MOST_ASIDE = 0.5
 _Device = TypeVar("_Device", bound=DeviceCalibration)
@@ -63,8 +65,8 @@ def _object_looks(explanation: Explanation) -> str:
     if "shift" in explanation.change.moves:
         shift = float(np.linalg.norm(after.centre - before.centre))
         words.append(f"moved by {_millimetres(shift)}")
-    if "turn" in explanation.change.moves:
-        turn = _angle(before.world_from_device, after.world_from_device)
+    turn = _angle(before.world_from_device, after.world_from_device)
+    if "turn" in explanation.change.moves and turn > _NO_TURN:
         words.append(f"turned by {_two_digits(np.rad2deg(turn))} degrees")
     return f"the object looks {', '.join(words)} against the mesh"
 
