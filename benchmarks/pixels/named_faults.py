@@ -98,7 +98,7 @@ def by_edges(plan: Scanner, n_draws: int) -> None:
     """Print how often each fault is named."""
     print("| the rest | fault | draws | named first | nothing as good | said nothing |")
     print("|---|---|---|---|---|---|")
-    for rest, errors in (("as calibrated", CALIBRATED), ("as planned", None)):
+    for rest, errors in (("as planned", None), ("as calibrated", CALIBRATED)):
         scanner = replace(plan, calibration=errors)
         rig = Supposed.of(scanner)
         bundle = Bundle(simulated_edges(rig, noise_px=NOISE_PX, most=1), rig)
