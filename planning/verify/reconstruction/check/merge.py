@@ -90,14 +90,14 @@ def merge(
     steps |= contradicted & (sharpness < _CONTRADICTED)
     doubtful = ~confirmed & (sharpness < _CROSSED)
 
-    shift, remaining, redundant = curves.only(~steps).fitted()
+    fit = curves.only(~steps).fitted()
     # A step lies anywhere between two rings; and what a pair is off by stays.
     noise_px = np.where(doubtful, pitch_px / np.sqrt(12.0), cloud.noise_px)
     certain = ~doubtful & (noise_px < _DOUBT_PX)
     fitted = replace(
         cloud,
-        points=cloud.points + shift[:, None] * cloud.beams,
-        noise_px=noise_px * np.where(certain, remaining, 1.0),
+        points=cloud.points + fit.shift[:, None] * cloud.beams,
+        noise_px=noise_px * np.where(certain, fit.remaining, 1.0),
     )
     normals, relief = np.full((len(cloud), 3), np.nan), np.zeros(len(cloud))
     for camera in np.unique(cloud.camera[~steps]):
@@ -106,7 +106,12 @@ def merge(
         planes = plane_normals(fitted.points[seen], cloud.rays[seen], tiles)
         normals[seen], relief[seen] = planes
     panel = PanelEffects.of(fitted, normals, plan)
-    bias_px = np.where(doubtful, 0.0, np.hypot(cloud.bias_px, panel.lattice_px))
+    move = fitted.per_pixel(normals)
+    # What light does to an edge every camera sees, some from its other side.
+    towards = np.sign(np.einsum("ij,ij->i", fitted.shift, normals)) * move
+    towards = np.nan_to_num(np.where(doubtful, 0.0, towards))
+    every = (fit.averaged(towards * off) for off in (cloud.bias_px, panel.lattice_px))
+    bias_px = np.where(doubtful, 0.0, np.hypot(*every) / move)
     outwards = fitted.points - panel.inwards[:, None] * cloud.rays
     fitted = replace(fitted, bias_px=bias_px, points=outwards)
     # In a step there is no surface whose normal would make an error less.
@@ -115,7 +120,7 @@ def merge(
     calibration = calibration_sigma(fitted, normals, plan)
     total = np.hypot(sigma, calibration)
 
-    stays = ~(steps | redundant)
+    stays = ~(steps | fit.redundant)
     size = pixel_sizes(cloud, plan)
     projector = cloud.projector.astype(np.int64)
     # What one camera sees at a slant another's point doesn't stand for.

@@ -10,6 +10,8 @@ _MIN_TILE_PX, _MAX_TILE_PX = 6, 64
 _MIN_POINTS = 12
 # A plane is one if the points spread in two directions, at most this unevenly.
 _MIN_SPREAD = 0.02
+# Deviation of what a point is a mean over: the lens, pixels, three of them on a line.
+_BLURRED_PX = np.sqrt(0.7**2 + 1.0 / 12.0 + 3.0**2 / 12.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,5 +67,6 @@ def plane_normals(points: Array, rays: Array, tiles: Tiles) -> tuple[Array, Arra
     flat = (count >= _MIN_POINTS) & (values[:, 1] > _MIN_SPREAD * values[:, 2])
     normals = np.where(flat[:, None], vectors[:, :, 0], np.nan)[tiles.of_point]
     away = np.einsum("ij,ij->i", normals, rays) > 0.0
-    relief = np.sqrt(np.maximum(values[:, 0], 0.0)) / (3.0 * tiles.side_px)
+    relief = np.sqrt(180.0 * np.maximum(values[:, 0], 0.0))
+    relief *= _BLURRED_PX**2 / (3.0 * tiles.side_px) ** 2
     return np.where(away[:, None], -normals, normals), relief[tiles.of_point]
