@@ -39,6 +39,11 @@ class Tiles:
         wide = padded[:-2] + padded[1:-1] + padded[2:]
         return (wide[:, :-2] + wide[:, 1:-1] + wide[:, 2:]).ravel()
 
+    def mean_around(self, values: Array, weights: Array) -> Array:
+        """Return means over the tile of each point and its neighbours, (n,)."""
+        every = np.maximum(self.sum_around(weights), np.finfo(float).tiny)
+        return (self.sum_around(values * weights) / every)[self.of_point]
+
 
 def plane_normals(points: Array, rays: Array, tiles: Tiles) -> tuple[Array, Array]:
     """Return normals of the planes through the points around each point's tile.
