@@ -8,8 +8,7 @@ Of a line's weights w, which are 1 / sigma^2 of edge noise:
   ``sum w b / sum w`` of displacements b along the normal, whose sign is that of the
   ring's side from which a camera looks;
 - what else moves points off their lines by d, the object's own shape in the first
-  place, shows: d has the variance of all that was averaged away, and this is the rest.
-  Its best estimate in nine tiles weighs each by 1 / sigma^4;
+  place, shows in d^2 beyond the variance of what was averaged away;
 - relief, which no line shows that bends as it: see `plane_normals`.
 """
 
@@ -82,12 +81,11 @@ class Sigmas:
         off *= np.nan_to_num(np.where(doubtful, 0.0, side * a_pixel))
         left = np.stack([fit.averaged(row) for row in off])
         apart = fit.shift * np.einsum("ij,ij->i", cloud.beams, normals)
-        noise = noise_px * a_pixel
-        more = apart**2 - noise**2 * (1.0 - remaining**2) - ((off - left) ** 2).sum(0)
-        weight = np.where((remaining < 1.0) & (noise > 0.0), noise, np.inf) ** -4.0
+        gone = np.square(noise_px * a_pixel) * (1.0 - remaining**2)
+        square = np.square(apart) - np.square(off - left).sum(axis=0)
         for rows, tiles in seen:
-            some = np.nan_to_num(more[rows]), np.nan_to_num(weight[rows])
-            relief[rows] = np.hypot(relief[rows], _root(tiles.mean_around(*some)))
+            more = tiles.excess_around(square[rows], gone[rows])
+            relief[rows] = np.sqrt(relief[rows] ** 2 + more)
         bias_px = np.where(doubtful, 0.0, np.linalg.norm(left, axis=0) / a_pixel)
         outwards = onto - panel.inwards[:, None] * cloud.rays
         moved = replace(moved, bias_px=bias_px, points=outwards)
@@ -105,6 +103,3 @@ def _by_camera(
     seen = [np.flatnonzero(chosen & (cloud.camera == camera)) for camera in cameras]
     return [(rows, Tiles.of(cloud.pixels[rows], pitch_px)) for rows in seen]
 
-
-def _root(square: Array) -> Array:
-    return np.sqrt(np.maximum(square, 0.0))
