@@ -4,8 +4,9 @@ First both render the same matt world without a bounce: how far edges lie apart,
 error of both clouds, and error / sigma by decile of sigma with sensor noise. Then what
 the built-in renderer leaves out, one effect after the other.
 
-    PYTHONPATH=.:tests python -m benchmarks.pixels.mitsuba_beside [paths, else 48]
+    PYTHONPATH=.:tests python -m benchmarks.pixels.mitsuba_beside [PATHS [OF_EFFECTS]]
 
+with 48 paths a pixel for both, or so many; 0 leaves a table out.
 Where Mitsuba is missing (`pip install 'ringrig[render]'`) it says so, no more.
 """
 
@@ -126,14 +127,14 @@ def beside(name: str, scanner: Scanner, spp: int) -> None:
     print(f"<!-- {time.monotonic() - begin:.0f} s -->", flush=True)
 
 
-def effects(name: str, scanner: Scanner, spp: int) -> None:
+def effects(scanner: Scanner, spp: int) -> None:
     """Print a line for each effect."""
     samples = sample_surface(scanner.mesh, 20_000, seed=0)
     tau = scanner.limits.check.tau_m
     first = reconstruct(scanner, seed=0, photometry=_NOISY).everything
     measured = nearest_distance(first, samples, 2.01 * tau) <= tau
     expected = Expected(samples, measured)
-    print(f"\n{name}; completeness: of what the built-in renderer measures\n")
+    print("\nCompleteness: of what the built-in renderer measures\n")
     print(
         "| effect | rms [mm] | bias [mm] | rms / sigma | complete | left out | "
         "false > 1 mm | what is told |\n|---|---|---|---|---|---|---|---|"
@@ -173,22 +174,26 @@ def _rms(values: _Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def main(spp: int) -> None:
+def main(spp: int, of_effects: int) -> None:
     """Print both tables."""
     if find_spec("mitsuba") is None:
         print("skipped: Mitsuba isn't installed (pip install 'ringrig[render]')")
         return
-    waves = rigs.bumpy_sphere(0.055, subdivisions=6)
-    objects = {"waves": rig(waves, 3478.0), "head": rig(head(), 2400.0)}
-    print(f"{spp} paths a pixel, one projector of 1280 x 800, two cameras\n")
-    print(
-        "| object | edges apart, rms [px] (share found) | built-in rms [mm] | Mitsuba "
-        "rms [mm] | difference |\n|---|---|---|---|---|"
-    )
-    for name, scanner in objects.items():
-        beside(name, scanner, spp)
-    effects("head", objects["head"], spp)
+    objects = {"head": rig(head(), 2400.0)}
+    if spp:
+        waves = rigs.bumpy_sphere(0.055, subdivisions=6)
+        print(f"{spp} paths a pixel, one projector of 1280 x 800, two cameras\n")
+        print(
+            "| object | edges apart, rms [px] (share found) | built-in rms [mm] | "
+            "Mitsuba rms [mm] | difference |\n|---|---|---|---|---|"
+        )
+        for name, scanner in ({"waves": rig(waves, 3478.0)} | objects).items():
+            beside(name, scanner, spp)
+    if of_effects:
+        print(f"\nHead, {of_effects} paths a pixel")
+        effects(objects["head"], of_effects)
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 48)
+    paths = [int(number) for number in sys.argv[1:3]] or [48]
+    main(paths[0], paths[-1])
