@@ -102,4 +102,3 @@ def _by_camera(
     cameras = np.unique(cloud.camera[chosen])
     seen = [np.flatnonzero(chosen & (cloud.camera == camera)) for camera in cameras]
     return [(rows, Tiles.of(cloud.pixels[rows], pitch_px)) for rows in seen]
-
