@@ -4,8 +4,9 @@ First both render the same matt world without a bounce: how far edges lie apart,
 error of both clouds, and error / sigma by decile of sigma with sensor noise. Then what
 the built-in renderer leaves out, one effect after the other.
 
-    PYTHONPATH=.:tests python -m benchmarks.pixels.mitsuba_beside [paths, else 48]
+    PYTHONPATH=.:tests python -m benchmarks.pixels.mitsuba_beside [PATHS [OF_EFFECTS]]
 
+with 48 paths a pixel for both, or so many; 0 leaves a table out.
 Where Mitsuba is missing (`pip install 'ringrig[render]'`) it says so, no more.
 """
 
@@ -20,14 +21,11 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 from support import reconstruction_rigs as rigs
 
+from benchmarks.pixels.cloud_sigma import OverSigma
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import sample_surface
 from geometry.shapes.sample_head.sample_head import sample_head
-from planning.verify.reconstruction.check.accuracy import (
-    Expected,
-    measure_accuracy,
-    nearest_distance,
-)
+from planning.verify.reconstruction.check.accuracy import Expected, nearest_distance
 from planning.verify.reconstruction.check.result import Reconstruction
 from planning.verify.reconstruction.reconstruct import reconstruct
 from planning.verify.reconstruction.render.mitsuba.materials import Surface
@@ -58,13 +56,14 @@ def head() -> TriangleMesh:
 
 @dataclass(frozen=True)
 class Effect:
-    """What differs from the matt world without a bounce."""
+    """What differs from the matt world without a bounce, and the share of its paths."""
 
     name: str
     physics: dict[str, Any] = field(default_factory=dict)
     surface: dict[str, Any] = field(default_factory=dict)
     light: dict[str, Any] = field(default_factory=dict)
     focus: Defocus | None = None
+    paths: float = 1.0
 
 
 EFFECTS = (
@@ -81,7 +80,13 @@ EFFECTS = (
         physics={"bounces": 3},
         surface={"albedo": 0.8},
     ),
-    Effect("skin, albedo 0.6", physics={"material": "skin"}, surface={"albedo": 0.6}),
+    # Scattered dozens of times, a path takes as much longer.
+    Effect(
+        "skin, albedo 0.6, a third of the paths",
+        physics={"material": "skin"},
+        surface={"albedo": 0.6},
+        paths=1.0 / 3.0,
+    ),
 )
 
 
@@ -101,22 +106,6 @@ def edges_apart(ours: Reconstruction, theirs: Reconstruction) -> tuple[_Array, f
     return np.linalg.norm(apart[alike], axis=1), float(found.mean())
 
 
-def over_sigma(result: Reconstruction, mesh: TriangleMesh) -> tuple[_Array, _Array]:
-    """Return error / sigma and sigma of the merged points where sigma is known."""
-    known = np.isfinite(result.merged.sigma)
-    sigma = result.merged.sigma[known]
-    cloud = result.merged.cloud.take(known)
-    return measure_accuracy(cloud, mesh).distances / sigma, sigma
-
-
-def deciles(result: Reconstruction, mesh: TriangleMesh) -> str:
-    """Return rms of error / sigma in each decile of sigma, and over all."""
-    ratio, sigma = over_sigma(result, mesh)
-    order = np.argsort(sigma, kind="stable")
-    parts = [_rms(ratio[part]) for part in np.array_split(order, 10)]
-    return " ".join(f"{part:.2f}" for part in parts) + f"   all {_rms(ratio):.2f}"
-
-
 def beside(name: str, scanner: Scanner, spp: int) -> None:
     """Print both renderers' figures of an object."""
     physics, begin = Physics(bounces=0, spp=spp), time.monotonic()
@@ -132,43 +121,48 @@ def beside(name: str, scanner: Scanner, spp: int) -> None:
         )
         if light.noisy:
             for who, one in (("built-in", ours), ("Mitsuba", theirs)):
-                row = deciles(one, scanner.mesh)
+                sure = OverSigma.of(one, scanner)
+                row = f"{sure.deciles}   all {sure.ratio:.2f}"
                 print(f"| {name}, error / sigma, {who} | {row} | | | |")
     print(f"<!-- {time.monotonic() - begin:.0f} s -->", flush=True)
 
 
-def effects(name: str, scanner: Scanner, spp: int) -> None:
+def effects(scanner: Scanner, spp: int) -> None:
     """Print a line for each effect."""
     samples = sample_surface(scanner.mesh, 20_000, seed=0)
     tau = scanner.limits.check.tau_m
     first = reconstruct(scanner, seed=0, photometry=_NOISY).everything
     measured = nearest_distance(first, samples, 2.01 * tau) <= tau
     expected = Expected(samples, measured)
-    print(f"\n{name}; completeness: of what the built-in renderer measures\n")
+    print("\nCompleteness: of what the built-in renderer measures\n")
     print(
         "| effect | rms [mm] | bias [mm] | rms / sigma | complete | left out | "
         "false > 1 mm | what is told |\n|---|---|---|---|---|---|---|---|"
     )
     for effect in EFFECTS:
-        usual = Physics(bounces=0, spp=spp, surface=Surface(**effect.surface))
+        usual = Physics(
+            bounces=0,
+            spp=max(1, round(effect.paths * spp)),
+            surface=Surface(**effect.surface),
+        )
         physics = replace(usual, **effect.physics)
         light = replace(_NOISY, **effect.light)
         stands = replace(scanner, projector_focus=effect.focus)
         result = reconstruct(
             stands, seed=0, expected=expected, photometry=light, physics=physics
         )
-        print(_line(effect.name, result, scanner.mesh), flush=True)
+        print(_line(effect.name, result, scanner), flush=True)
 
 
-def _line(name: str, result: Reconstruction, mesh: TriangleMesh) -> str:
+def _line(name: str, result: Reconstruction, scanner: Scanner) -> str:
     told = "; ".join(result.failures + result.remarks) or "nothing: limits are kept"
     errors = result.accuracy
     if errors is None:
         return f"| {name} | | | | | | | {told} |"
-    ratio = _rms(over_sigma(result, mesh)[0])
+    ratio = OverSigma.of(result, scanner).ratio
     left_out = sum(sum(pair.rejected.values()) for pair in result.pairs)
     share = left_out / max(1, sum(pair.n_edges for pair in result.pairs))
-    false = float(np.mean(np.abs(errors.distances) > _FALSE_M))
+    false = errors.beyond(_FALSE_M)
     return (
         f"| {name} | {1e3 * errors.rms_m:.3f} | {1e3 * errors.bias_m:+.3f} | "
         f"{ratio:.2f} | {result.completeness.fractions[1]:.1%} | {share:.1%} | "
@@ -180,22 +174,26 @@ def _rms(values: _Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def main(spp: int) -> None:
+def main(spp: int, of_effects: int) -> None:
     """Print both tables."""
     if find_spec("mitsuba") is None:
         print("skipped: Mitsuba isn't installed (pip install 'ringrig[render]')")
         return
-    waves = rigs.bumpy_sphere(0.055, subdivisions=6)
-    objects = {"waves": rig(waves, 3478.0), "head": rig(head(), 2400.0)}
-    print(f"{spp} paths a pixel, one projector of 1280 x 800, two cameras\n")
-    print(
-        "| object | edges apart, rms [px] (share found) | built-in rms [mm] | Mitsuba "
-        "rms [mm] | difference |\n|---|---|---|---|---|"
-    )
-    for name, scanner in objects.items():
-        beside(name, scanner, spp)
-    effects("head", objects["head"], spp)
+    objects = {"head": rig(head(), 2400.0)}
+    if spp:
+        waves = rigs.bumpy_sphere(0.055, subdivisions=6)
+        print(f"{spp} paths a pixel, one projector of 1280 x 800, two cameras\n")
+        print(
+            "| object | edges apart, rms [px] (share found) | built-in rms [mm] | "
+            "Mitsuba rms [mm] | difference |\n|---|---|---|---|---|"
+        )
+        for name, scanner in ({"waves": rig(waves, 3478.0)} | objects).items():
+            beside(name, scanner, spp)
+    if of_effects:
+        print(f"\nHead, {of_effects} paths a pixel")
+        effects(objects["head"], of_effects)
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 48)
+    paths = [int(number) for number in sys.argv[1:3]] or [48]
+    main(paths[0], paths[-1])

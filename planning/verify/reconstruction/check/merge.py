@@ -18,13 +18,10 @@ from planning.verify.reconstruction.decode.lit_image import LitImage
 from planning.verify.reconstruction.scanner import Scanner
 
 from .calibration_sigma import calibration_sigma, camera_px
-from .lattice import PanelEffects
 from .overlaps import compare_overlaps, pixel_sizes
+from .point_sigma import Sigmas
 from .ring_curves import RingCurves
-from .tiles import Tiles, plane_normals
 
-# From here on it isn't noise but doubt of a pair, which no average makes less [px].
-_DOUBT_PX = 0.5
 # Points of two projectors are of one spot in a cell so large [px].
 _SPOT_PX = 1.5
 # In cells so large those go whose sigma is so many times that of another pair: they
@@ -90,32 +87,15 @@ def merge(
     steps |= contradicted & (sharpness < _CONTRADICTED)
     doubtful = ~confirmed & (sharpness < _CROSSED)
 
-    shift, remaining, redundant = curves.only(~steps).fitted()
-    # A step lies anywhere between two rings; and what a pair is off by stays.
-    noise_px = np.where(doubtful, pitch_px / np.sqrt(12.0), cloud.noise_px)
-    certain = ~doubtful & (noise_px < _DOUBT_PX)
-    fitted = replace(
-        cloud,
-        points=cloud.points + shift[:, None] * cloud.beams,
-        noise_px=noise_px * np.where(certain, remaining, 1.0),
+    fit = curves.only(~steps).fitted()
+    left = Sigmas.of(
+        cloud, fit, plan, doubtful=doubtful, steps=steps, pitch_px=pitch_px
     )
-    normals, relief = np.full((len(cloud), 3), np.nan), np.zeros(len(cloud))
-    for camera in np.unique(cloud.camera[~steps]):
-        seen = np.flatnonzero((cloud.camera == camera) & ~steps)
-        tiles = Tiles.of(cloud.pixels[seen], pitch_px)
-        planes = plane_normals(fitted.points[seen], cloud.rays[seen], tiles)
-        normals[seen], relief[seen] = planes
-    panel = PanelEffects.of(fitted, normals, plan)
-    bias_px = np.where(doubtful, 0.0, np.hypot(cloud.bias_px, panel.lattice_px))
-    outwards = fitted.points - panel.inwards[:, None] * cloud.rays
-    fitted = replace(fitted, bias_px=bias_px, points=outwards)
-    # In a step there is no surface whose normal would make an error less.
-    largest = np.linalg.norm(fitted.shift, axis=1) * fitted.noise_px
-    sigma = np.where(doubtful, largest, np.hypot(fitted.sigma(normals), relief))
+    fitted, normals, sigma = left.cloud, left.normals, left.sigma
     calibration = calibration_sigma(fitted, normals, plan)
     total = np.hypot(sigma, calibration)
 
-    stays = ~(steps | redundant)
+    stays = ~(steps | fit.redundant)
     size = pixel_sizes(cloud, plan)
     projector = cloud.projector.astype(np.int64)
     # What one camera sees at a slant another's point doesn't stand for.

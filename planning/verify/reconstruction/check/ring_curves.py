@@ -16,6 +16,7 @@ from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.scanner import Scanner
 
 from .overlaps import pixel_sizes
+from .ring_fit import Lines, RingFit, in_cloud
 
 _T = TypeVar("_T", bound=np.generic)
 
@@ -49,7 +50,7 @@ class RingCurves:
         one: Places of points in `order`, shape (n_links,).
         other: Of a neighbour of each.
         apart: How much larger its s is [m].
-        rise: How much larger its t is [m].
+        depth: t of each point [m], shape (n,).
         apart_px: `apart` in pixels of the camera that measured the first point.
     """
 
@@ -59,7 +60,7 @@ class RingCurves:
     one: Indices
     other: Indices
     apart: Array
-    rise: Array
+    depth: Array
     apart_px: Array
 
     @classmethod
@@ -94,10 +95,15 @@ class RingCurves:
             further.append(ends[-1] + k)
         one, other = np.concatenate(ends), np.concatenate(further)
         apart = (angle[other] - angle[one]) * metres[one]
-        rise, camera = depth[other] - depth[one], cloud.camera[order].astype(np.int64)
+        camera = cloud.camera[order].astype(np.int64)
         return cls(
-            order, camera, slide[order], one, other, apart, rise, apart / pixel[one]
+            order, camera, slide[order], one, other, apart, depth, apart / pixel[one]
         )
+
+    @property
+    def rise(self) -> Array:
+        """How much larger the t of neighbours is [m], (n_links,)."""
+        return self.depth[self.other] - self.depth[self.one]
 
     def only(self, points: Mask) -> "RingCurves":
         """Return the same with neighbours among some of the cloud's points, (n,)."""
@@ -128,38 +134,37 @@ class RingCurves:
             met[np.concatenate(at)] = True
         return self._in_cloud(confirmed), self._in_cloud(contradicted & ~may_be)
 
-    def fitted(self) -> tuple[Array, Array, Mask]:
+    def fitted(self) -> "RingFit":
         """Fit a line through the points near each, of whatever cameras, within reach.
 
         With weights ``1 / sigma^2``; of the widest reach at which the estimates of all
         narrower ones still lie within `_AGREE` deviations (intersecting intervals:
         Goldenshluger & Nemirovski 1997), so that creases stay.
-
-        Returns:
-            How far each point is from its line along the light [m]; the share of its
-            deviation that is left; and whether it lies between better points of other
-            cameras, shape (n,) each.
         """
         slide = np.linalg.norm(self.slide, axis=1)
-        slope = self._on_one_surface(slide)._line(slide)[0]
+        slope, _ = self._on_one_surface(slide)._lines(slide).through(self.depth)
         across = self.slide[:, 1] - slope * self.slide[:, 0]
         first = np.hypot(across, _ASTRAY * slide)
         curves = self._on_one_surface(first)
         shift, sigma = np.zeros(len(first)), first.copy()
         low, high = -_AGREE * sigma, _AGREE * sigma
+        used: list[tuple[Mask, Lines]] = []
         for reach in _REACHES_PX:
-            near = curves._linked(curves.apart_px <= reach)
-            _, offset, spread = near._line(first)
+            lines = curves._linked(curves.apart_px <= reach)._lines(first)
+            _, offset = lines.through(self.depth)
+            spread = lines.spread
             low = np.maximum(low, offset - _AGREE * spread)
             high = np.minimum(high, offset + _AGREE * spread)
             better = (low <= high) & (spread < sigma)
+            used.append((better, lines))
             shift = np.where(better, offset, shift)
             sigma = np.where(better, spread, sigma)
-        remaining, redundant = sigma / first, curves._redundant(first)
-        return (
+        return RingFit(
+            self.order,
             self._in_cloud(shift),
-            self._in_cloud(remaining),
-            self._in_cloud(redundant),
+            self._in_cloud(sigma / first),
+            self._in_cloud(curves._redundant(first)),
+            tuple(used),
         )
 
     def _redundant(self, sigma: Array) -> Mask:
@@ -170,29 +175,8 @@ class RingCurves:
         after[near.one[~first]] = True
         return before & after
 
-    def _line(self, sigma: Array) -> tuple[Array, Array, Array]:
-        """Slope, offset along t and its deviation of the line about each point."""
-        weight = sigma**-2.0
-        sums = np.zeros((5, len(weight)))
-        sums[0] = weight
-        count = np.zeros(len(weight))
-        ends = (self.one, self.other, 1.0), (self.other, self.one, -1.0)
-        for at, of, sign in ends:
-            w = weight[of]
-            s, t = sign * self.apart, sign * self.rise
-            ws = w * s
-            count += np.bincount(at, minlength=len(weight))
-            for row, term in zip(sums, (w, ws, ws * s, w * t, ws * t), strict=True):
-                row += np.bincount(at, term, len(weight))
-        w, ws, wss, wt, wst = sums
-        det = w * wss - ws * ws
-        good = (count >= 2) & (det > 1e-6 * w * wss)
-        det = np.where(good, det, 1.0)
-        return (
-            np.where(good, (w * wst - ws * wt) / det, 0.0),
-            np.where(good, (wss * wt - ws * wst) / det, 0.0),
-            np.where(good, np.sqrt(wss / det), sigma),
-        )
+    def _lines(self, sigma: Array) -> Lines:
+        return Lines.of(self.one, self.other, self.apart, sigma)
 
     def _of_two_cameras(self) -> Mask:
         return self.camera[self.one] != self.camera[self.other]
@@ -205,10 +189,8 @@ class RingCurves:
         return np.abs(self.rise) <= _SIGMAS * noise + _STEEPEST * self.apart
 
     def _linked(self, chosen: Mask) -> "RingCurves":
-        names = "one", "other", "apart", "rise", "apart_px"
+        names = "one", "other", "apart", "apart_px"
         return replace(self, **{name: getattr(self, name)[chosen] for name in names})
 
     def _in_cloud(self, values: NDArray[_T]) -> NDArray[_T]:
-        there = np.empty_like(values)
-        there[self.order] = values
-        return there
+        return in_cloud(self.order, values)

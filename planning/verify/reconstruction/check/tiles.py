@@ -10,6 +10,8 @@ _MIN_TILE_PX, _MAX_TILE_PX = 6, 64
 _MIN_POINTS = 12
 # A plane is one if the points spread in two directions, at most this unevenly.
 _MIN_SPREAD = 0.02
+# Deviation of what a point is a mean over: the lens, pixels, three of them on a line.
+_BLURRED_PX = np.sqrt(0.7**2 + 1.0 / 12.0 + 3.0**2 / 12.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +39,22 @@ class Tiles:
         wide = padded[:-2] + padded[1:-1] + padded[2:]
         return (wide[:, :-2] + wide[:, 1:-1] + wide[:, 2:]).ravel()
 
+    def excess_around(self, square: Array, usual: Array) -> Array:
+        """Return how much more squares are than usual about each point, at least 0.
+
+        Means over nine tiles, weighted by ``1 / sqrt(usual)``: between the plain mean,
+        which the noisiest few decide, and the surest, which leaves out what is rare.
+
+        Args:
+            square: Of random numbers, shape (n,).
+            usual: Their expectation; 0 or NaN: not looked at, shape (n,).
+        """
+        known = np.isfinite(square) & (usual > 0.0)
+        weight = np.where(known, usual, np.inf) ** -0.5
+        every = np.maximum(self.sum_around(weight), np.finfo(float).tiny)
+        rest = weight * np.where(known, square - usual, 0.0)
+        return np.maximum(self.sum_around(rest) / every, 0.0)[self.of_point]
+
 
 def plane_normals(points: Array, rays: Array, tiles: Tiles) -> tuple[Array, Array]:
     """Return normals of the planes through the points around each point's tile.
@@ -48,8 +66,9 @@ def plane_normals(points: Array, rays: Array, tiles: Tiles) -> tuple[Array, Arra
 
     Returns:
         Unit normals towards the camera, shape (n, 3), NaN where points are too few, or
-        on a line; and the relief of a pixel's width [m], shape (n,): points lie off the
-        plane of nine tiles by so much, and near a crease it goes with the width.
+        on a line; and how far a bent surface lies off the mean of what a point is one
+        of [m], shape (n,). Bent by k over a width w, it lies r = k w^2 / sqrt(720) off
+        the plane of nine tiles, rms, and a mean over b (rms) k b^2 / 2 off itself.
     """
     points = points - points.mean(axis=0)
     count = tiles.sum_around()
@@ -65,5 +84,6 @@ def plane_normals(points: Array, rays: Array, tiles: Tiles) -> tuple[Array, Arra
     flat = (count >= _MIN_POINTS) & (values[:, 1] > _MIN_SPREAD * values[:, 2])
     normals = np.where(flat[:, None], vectors[:, :, 0], np.nan)[tiles.of_point]
     away = np.einsum("ij,ij->i", normals, rays) > 0.0
-    relief = np.sqrt(np.maximum(values[:, 0], 0.0)) / (3.0 * tiles.side_px)
+    relief = np.sqrt(180.0 * np.maximum(values[:, 0], 0.0))
+    relief *= (_BLURRED_PX / (3.0 * tiles.side_px)) ** 2
     return np.where(away[:, None], -normals, normals), relief[tiles.of_point]

@@ -244,15 +244,16 @@ def _crossings(reader: _Reader) -> tuple[ImageEdges, Indices]:
     along, cross = along[good].astype(np.float64), cross[good].astype(np.float64)
     slope = np.hypot(along, cross)
     contrast = 0.5 * (reader.contrast[i, j] + reader.contrast[i, j + 1])
-    uneven = _unevenness(reader.contrast, i, j, along / slope, cross / slope)
     noise = reader.noise.at(0.5 * (reader.half_lit(i, j) + reader.half_lit(i, j + 1)))
-    grey = np.sqrt(2.0) * noise / contrast * spread * np.abs(along) / slope
+    grey = np.sqrt(2.0) * noise / contrast
+    uneven = _unevenness(reader.contrast, i, j, along / slope, cross / slope)
+    uneven = np.sqrt(np.maximum(np.square(uneven) - np.square(0.5 * grey), 0.0))
     edges = ImageEdges(
         np.column_stack([j + zero, i.astype(np.float64)]),
         rings[good],
         np.where(root[good] > 0.0, 1, -1).astype(np.int8),
         np.column_stack([along, cross]) / slope[:, None],
-        grey,
+        grey * spread * np.abs(along) / slope,
         blur * np.abs(along) / slope,
         _LENS_PX**2 * uneven,
     )
@@ -290,7 +291,10 @@ def _zero_between(first: Grey, second: Grey) -> tuple[Array, Array, Array]:
         for level in (first, second)
     )
     rise = np.abs(a - b)
-    spread = np.hypot(b * np.exp(a * a), a * np.exp(b * b)) / np.square(rise)
+    of_first, of_second = b * np.exp(a * a), a * np.exp(b * b)
+    of_first *= np.sqrt(1.0 + np.square(first))
+    of_second *= np.sqrt(1.0 + np.square(second))
+    spread = np.hypot(of_first, of_second) / np.square(rise)
     blur = np.sqrt(0.5) / rise
     return a / (a - b), 0.5 * np.sqrt(np.pi) * spread, blur
 

@@ -185,11 +185,13 @@ class PathTracer:
             for window in self._windows
         ]
         knobs = mi.traverse(scene)
+        # The scene's only image is the panel's; releases call it otherwise.
+        *_, image = (name for name, _ in knobs if name.endswith(".data"))
         for k, point in enumerate(pupil):
             pose = world_from_light(projector, point, self._truth.projector_focus)
             knobs[f"{_LIGHT}.to_world"] = mi.Transform4f(pose.astype(np.float32))
             for number, pack in enumerate(packs):
-                knobs[f"{_LIGHT}.irradiance.data"] = mi.TensorXf(pack)
+                knobs[image] = mi.TensorXf(pack)
                 knobs.update()
                 for c in self._all:
                     # The same paths for all packs: no noise between a frame and white.
