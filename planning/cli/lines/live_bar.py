@@ -55,7 +55,7 @@ class LiveBar:
         elif line.startswith(_PAIR):
             self._pair(line)
             return
-        elif not line.startswith("  ") and not self._stage.startswith("check"):
+        elif self._stage.startswith("reading") or line.startswith("written"):
             self._progress.console.print(f"plan: {line}", markup=False, highlight=False)
         self._show(self._done)
 
