@@ -158,7 +158,7 @@ def progress(*, quiet: bool) -> Generator[Report]:
         return
     from rich.console import Console
 
-    from .lines.live_bar import LiveBar
+    from planning.report.live_bar import LiveBar
 
     bar = LiveBar(Console(stderr=True))
     try:

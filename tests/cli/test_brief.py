@@ -5,9 +5,9 @@ import io
 import pytest
 from rich.console import Console
 
-from planning.cli.lines.live_bar import LiveBar
 from planning.cli.show_command import show_command
 from planning.model.plan import RigPlan
+from planning.report.live_bar import LiveBar
 from planning.report.summary.brief import COLUMNS, MOST_LINES, brief
 from planning.report.summary.sections import SECTIONS
 from planning.report.summary.shortfall import missing, shortfalls

@@ -1,9 +1,13 @@
 """Progress on a terminal: one live line with stage, percent and time left."""
 
 import time
+from collections.abc import Generator
+from contextlib import contextmanager
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
+
+from planning.model.progress import Report
 
 # How a stage's line begins, and its share of a run in percent: of the sample, checked.
 _STAGES = {
@@ -75,3 +79,19 @@ class LiveBar:
     def stop(self) -> None:
         """Take the bar away."""
         self._progress.stop()
+
+
+@contextmanager
+def shown(progress: Report | bool) -> Generator[Report | None]:
+    """Give what receives lines of progress: a bar if it is True, None if False."""
+    if not isinstance(progress, bool):
+        yield progress
+        return
+    if not progress:
+        yield None
+        return
+    bar = LiveBar(Console())
+    try:
+        yield bar
+    finally:
+        bar.stop()
