@@ -11,10 +11,8 @@ from threadpoolctl import threadpool_limits
 from geometry.mesh.mesh import TriangleMesh
 from planning.model.document.certificates import CamerasBy
 from planning.model.document.device_records import RingAxis
-from planning.model.errors import InputError
 from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
 from planning.model.progress import TIME_IS_UP, Report, Stopwatch
-from planning.model.words import count_words
 from planning.report.assemble import write_plan
 from planning.report.entries.cost_entry import cost_record
 from planning.report.live_bar import shown
@@ -29,7 +27,7 @@ from planning.scene.interest import Select, Weight
 from planning.scene.ranges.ranged_body import RangedBody
 from planning.verify.verification import verify_plan
 
-from .steps.prepare import prepared, request_of
+from .steps.prepare import prepared, request_of, standing_devices
 from .steps.stages import (
     as_they_stand,
     bounded_cameras,
@@ -134,7 +132,7 @@ def plan_rig(
     rig = rig if fixed is None else fixed.on(rig)
     evaluates = max_projectors is None
     if max_projectors is None:
-        max_projectors, max_cameras = _standing(rig)
+        max_projectors, max_cameras = standing_devices(rig)
     wishes = Wishes(
         max_projectors=max_projectors,
         max_cameras=max_cameras,
@@ -198,23 +196,6 @@ def missed_by(plan: RigPlan, *, check: bool) -> tuple[str, ...]:
     if check and plan.document.reconstruction is None:
         missed += ("the check wasn't made: the time limit came first",)
     return missed
-
-
-def _standing(rig: Rig) -> tuple[int, int]:
-    """How many projectors and cameras of a rig stand already.
-
-    Raises:
-        InputError: If none of either does.
-    """
-    kinds = [table.kind for table in rig.table.existing]
-    counts = kinds.count("projector"), kinds.count("camera")
-    if not all(counts):
-        raise InputError(
-            f"{count_words(counts[0], 'projector')} and "
-            f"{count_words(counts[1], 'camera')} stand; a rig measures with one of "
-            f"either or more"
-        )
-    return counts
 
 
 def _evaluated(
