@@ -7,10 +7,20 @@ from ._siblings import check_siblings
 
 if TYPE_CHECKING:
     from geometry.files.readers import load_mesh as load_mesh
+    from geometry.mesh.mesh import MeshError as MeshError
+    from planning.handover.handed_plan import HandedPlan
+    from planning.handover.planner import plan_rig as plan_rig
+    from planning.handover.planner import sweep as sweep
+    from planning.model.errors import CalibrationError as CalibrationError
+    from planning.model.errors import CapturesError as CapturesError
+    from planning.model.errors import InfeasibleLimitsError as InfeasibleLimitsError
     from planning.model.errors import InputError as InputError
+    from planning.model.errors import PlanFileError as PlanFileError
     from planning.model.errors import PlanningError as PlanningError
+    from planning.model.errors import RigError as RigError
+    from planning.model.errors import TimeLimitError as TimeLimitError
+    from planning.model.plan import InterruptedPlanError as InterruptedPlanError
     from planning.model.plan import RequirementError as RequirementError
-    from planning.model.plan import RigPlan as RigPlan
     from planning.rig.mounted import read_mounted as read_mounted
     from planning.rig.rig import Rig as Rig
     from planning.rig.rig import load_rig as load_rig
@@ -21,36 +31,37 @@ if TYPE_CHECKING:
     from planning.verify.verification import Verification as Verification
     from planning.verify.verification import verify_plan as verify_plan
 
-    from .pipeline import plan_rig as plan_rig
+    RigPlan = HandedPlan
 
 # Imported on first use (PEP 562), so that `plan --help` stays cheap.
 _EXPORTS = {
-    "InputError": "planning.model.errors",
-    "PlanningError": "planning.model.errors",
-    "RequirementError": "planning.model.plan",
-    "RangedBody": "planning.scene.ranges.ranged_body",
-    "Rig": "planning.rig.rig",
-    "RigPlan": "planning.model.plan",
-    "Verification": "planning.verify.verification",
-    "load_mesh": "geometry.files.readers",
-    "load_rig": "planning.rig.rig",
-    "plan_rig": "planning.pipeline",
-    "read_mounted": "planning.rig.mounted",
-    "read_ranges": "planning.scene.ranges.ranged_body",
-    "read_selection": "planning.scene.interest",
-    "read_weight": "planning.scene.interest",
-    "verify_plan": "planning.verify.verification",
+    "geometry.files.readers": ("load_mesh",),
+    "geometry.mesh.mesh": ("MeshError",),
+    "planning.handover.planner": ("plan_rig", "sweep"),
+    "planning.model.errors": (
+        *("CalibrationError", "CapturesError", "InfeasibleLimitsError", "InputError"),
+        *("PlanFileError", "PlanningError", "RigError", "TimeLimitError"),
+    ),
+    "planning.model.plan": ("InterruptedPlanError", "RequirementError"),
+    "planning.rig.mounted": ("read_mounted",),
+    "planning.rig.rig": ("Rig", "load_rig"),
+    "planning.scene.interest": ("read_selection", "read_weight"),
+    "planning.scene.ranges.ranged_body": ("RangedBody", "read_ranges"),
+    "planning.verify.verification": ("Verification", "verify_plan"),
 }
+_HOME = {name: home for home, names in _EXPORTS.items() for name in names}
 
 
 def __getattr__(name: str) -> object:
-    if name not in _EXPORTS:
+    if name == "RigPlan":
+        return import_module("planning.handover.handed_plan").HandedPlan
+    if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_EXPORTS[name]), name)
+    return getattr(import_module(_HOME[name]), name)
 
 
 def __dir__() -> list[str]:
-    return list(_EXPORTS)
+    return sorted([*_HOME, "RigPlan"])
 
 
 check_siblings()

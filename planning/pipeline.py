@@ -4,18 +4,18 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from typing import Literal
 
 from threadpoolctl import threadpool_limits
 
 from geometry.mesh.mesh import TriangleMesh
 from planning.model.document.certificates import CamerasBy
 from planning.model.document.device_records import RingAxis
-from planning.model.errors import InputError
 from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
 from planning.model.progress import TIME_IS_UP, Report, Stopwatch
-from planning.model.words import count_words
 from planning.report.assemble import write_plan
 from planning.report.entries.cost_entry import cost_record
+from planning.report.live_bar import shown
 from planning.report.partial_plan import PartialPlan, PlanRequest
 from planning.report.summary.shortfall import shortfalls
 from planning.report.tolerance.robust import robustly
@@ -27,8 +27,8 @@ from planning.scene.interest import Select, Weight
 from planning.scene.ranges.ranged_body import RangedBody
 from planning.verify.verification import verify_plan
 
-from .prepare import prepared, request_of
-from .stages import (
+from .steps.prepare import prepared, request_of, standing_devices
+from .steps.stages import (
     as_they_stand,
     bounded_cameras,
     bounded_projectors,
@@ -68,10 +68,11 @@ def plan_rig(
     prove: bool = False,
     cameras_by: CamerasBy = "both",
     time_limit: float | None = None,
-    progress: Report | None = None,
+    progress: Report | bool = False,
     command: Sequence[str] = (),
     keep: Keep | None = None,
     fixed: Mounted | None = None,
+    on_miss: Literal["raise", "return"] = "raise",
 ) -> RigPlan:
     """Plan the projectors and cameras that measure a surface, and check the plan.
 
@@ -110,14 +111,17 @@ def plan_rig(
         cameras_by: Route to the cameras: the smallest `cover` of candidates, the
             largest baselines of the `paper`, or the better of `both`.
         time_limit: Wall time in [s] that cuts the run; the plan is then `truncated`.
-        progress: Receives a line when a stage begins.
+        progress: Receives a line when a stage begins; True: a bar is shown, on a
+            terminal or in a notebook.
         command: Words of the command line, for the record.
         keep: Receives the plan when it is made and not yet checked; with a time limit
             also the first one, before its poses are improved.
         fixed: Devices that stay where they are and count, from `read_mounted`.
+        on_miss: Whether a plan that misses a requirement is raised with the error, or
+            returned.
 
     Returns:
-        The plan, every requirement met.
+        The plan, every requirement met unless `on_miss` is `return`.
 
     Raises:
         InputError: If an argument can't be used.
@@ -128,7 +132,7 @@ def plan_rig(
     rig = rig if fixed is None else fixed.on(rig)
     evaluates = max_projectors is None
     if max_projectors is None:
-        max_projectors, max_cameras = _standing(rig)
+        max_projectors, max_cameras = standing_devices(rig)
     wishes = Wishes(
         max_projectors=max_projectors,
         max_cameras=max_cameras,
@@ -143,9 +147,12 @@ def plan_rig(
         ring_axis=ring_axis,
         robust=robust,
     )
-    clock = Stopwatch(progress, time_limit=time_limit)
     # BLAS must not split sums differently with another number of threads.
-    with clock.ticking(), threadpool_limits(1):
+    with (
+        shown(progress) as report,
+        (clock := Stopwatch(report, time_limit=time_limit)).ticking(),
+        threadpool_limits(1),
+    ):
         request = replace(
             request_of(mesh, rig, wishes, clock, select=select, weight=weight),
             seed=seed,
@@ -167,7 +174,8 @@ def plan_rig(
                 if not other.document.truncated:
                     other = _checked(other, partial, clock, keep)
                     plan = plan if missed_by(other, check=True) else other
-    if missed := missed_by(plan, check=check):
+    missed = missed_by(plan, check=check)
+    if missed and on_miss == "raise":
         raise RequirementError(plan, missed)
     return plan
 
@@ -188,23 +196,6 @@ def missed_by(plan: RigPlan, *, check: bool) -> tuple[str, ...]:
     if check and plan.document.reconstruction is None:
         missed += ("the check wasn't made: the time limit came first",)
     return missed
-
-
-def _standing(rig: Rig) -> tuple[int, int]:
-    """How many projectors and cameras of a rig stand already.
-
-    Raises:
-        InputError: If none of either does.
-    """
-    kinds = [table.kind for table in rig.table.existing]
-    counts = kinds.count("projector"), kinds.count("camera")
-    if not all(counts):
-        raise InputError(
-            f"{count_words(counts[0], 'projector')} and "
-            f"{count_words(counts[1], 'camera')} stand; a rig measures with one of "
-            f"either or more"
-        )
-    return counts
 
 
 def _evaluated(

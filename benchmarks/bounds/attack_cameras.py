@@ -38,7 +38,6 @@ from planning import load_rig
 from planning.model.planned import PlannedProjector
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Workspace
-from planning.prepare import prepared
 from planning.projectors.projector_poses import widen_margins
 from planning.proofs.all_poses import Effort
 from planning.proofs.camera_bound import camera_trees
@@ -48,7 +47,8 @@ from planning.rig.wishes import Wishes
 from planning.scene.draws import Draw
 from planning.scene.measured import LitSamples, lit_samples
 from planning.scene.scene import Scene
-from planning.stages import first_projectors
+from planning.steps.prepare import prepared
+from planning.steps.stages import first_projectors
 from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.predicates.audit_devices import AuditCamera, AuditProjector
 from planning.verify.audit.predicates.occlusion import Shadow

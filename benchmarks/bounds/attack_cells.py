@@ -41,7 +41,6 @@ from planning import load_rig
 from planning.model.planned import PlannedProjector
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Workspace
-from planning.prepare import prepared
 from planning.proofs.all_poses import BoundQuestion, Effort
 from planning.proofs.cells.aim_cells import AimTree
 from planning.proofs.cells.direction_cells import DirectionTree
@@ -52,6 +51,7 @@ from planning.rig.wishes import Wishes
 from planning.scene.draws import Draw
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
+from planning.steps.prepare import prepared
 
 ROOT = Path(__file__).resolve().parents[2]
 LIGHTS = ("parallel", "diverging")

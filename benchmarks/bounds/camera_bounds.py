@@ -32,12 +32,12 @@ from planning.cameras.proved_cameras import bound_stage
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera
 from planning.model.progress import Stopwatch
-from planning.prepare import prepared
 from planning.projectors.projector_poses import widen_margins
 from planning.proofs.camera_bound import DEFAULT, PROVE
 from planning.report.partial_plan import PlanRequest
 from planning.rig.wishes import Wishes
-from planning.stages import first_projectors
+from planning.steps.prepare import prepared
+from planning.steps.stages import first_projectors
 
 
 def main() -> int:

@@ -30,12 +30,12 @@ from geometry.mesh.mesh import TriangleMesh
 from planning import load_rig
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.progress import Stopwatch
-from planning.prepare import prepared
 from planning.projectors.projector_stage import ProjectorStage, plan_projectors
 from planning.projectors.proved_projectors import prove_fewest
 from planning.proofs.projector_bound import DEFAULT, PROVE
 from planning.report.partial_plan import PlanRequest, Prepared
 from planning.rig.wishes import Wishes
+from planning.steps.prepare import prepared
 
 ROOT = Path(__file__).resolve().parents[2]
 MANY = 200

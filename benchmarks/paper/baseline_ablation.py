@@ -45,7 +45,6 @@ from planning.cameras.camera_baselines import BaselineSamples, baseline_limits
 from planning.cameras.camera_cover import camera_candidate_views, measured_of
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.progress import Stopwatch
-from planning.prepare import prepared
 from planning.report.partial_plan import PlanRequest, Prepared
 from planning.rig.rig import Rig
 from planning.rig.wishes import Wishes
@@ -53,6 +52,7 @@ from planning.scene.camera_views import CandidateViews
 from planning.scene.draws import Draw
 from planning.scene.measured import LitSamples, taken
 from planning.scene.scene import Scene
+from planning.steps.prepare import prepared
 
 OLD = "14fa3fda"
 ROOT = Path(__file__).resolve().parents[2]
@@ -198,7 +198,7 @@ def _from_file(name: str) -> tuple[TriangleMesh, str | None]:
 
 def _planned(ready: Prepared) -> tuple[PlannedProjector, ...]:
     from planning.projectors.projector_poses import widen_margins
-    from planning.stages import first_projectors
+    from planning.steps.stages import first_projectors
 
     stage = first_projectors(ready, Stopwatch(None))
     return widen_margins(ready.scene, stage)

@@ -36,7 +36,6 @@ from planning.cameras.camera_stage import CameraSolution, place_cameras
 from planning.model.document.certificates import CamerasBy
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.progress import Stopwatch
-from planning.prepare import prepared
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import ProjectorStage
 from planning.report.assemble import write_plan
@@ -45,7 +44,8 @@ from planning.rig.wishes import Wishes
 from planning.scene.draws import Draw
 from planning.scene.measured import lit_samples, measured_by
 from planning.scene.scene import Scene
-from planning.stages import first_projectors, polished
+from planning.steps.prepare import prepared
+from planning.steps.stages import first_projectors, polished
 from planning.verify.audit.audit import audit_plan
 
 _PROJECTORS = 3

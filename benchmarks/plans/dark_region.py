@@ -25,13 +25,13 @@ from planning import load_mesh, load_rig
 from planning.model.device_poses import moved_to
 from planning.model.planned import PlannedProjector
 from planning.model.progress import Stopwatch
-from planning.prepare import prepared
 from planning.projectors.candidate_set import CandidateSet, CandidateSource
 from planning.proofs.quotas import Quotas, RegionFloors
 from planning.report.partial_plan import PlanRequest
 from planning.rig.wishes import Wishes
 from planning.scene.draws import Draw
 from planning.scene.scene import Scene
+from planning.steps.prepare import prepared
 
 _N, _REGION, _FLOOR, _SHARE = 640, 8, 0.3, 0.01
 _COARSE, _FINE = (1.0, 1.0, 0.5, 0.25), (0.5, 0.25, 0.12)

@@ -25,14 +25,14 @@ from geometry.curvature.refinement import cut_for_curvature
 from geometry.mesh.mesh import TriangleMesh
 from planning import load_mesh, load_rig
 from planning.model.progress import Stopwatch
-from planning.prepare import prepared
 from planning.projectors.candidate_set import CandidateSet
 from planning.projectors.projector_poses import widen_margins
 from planning.report.partial_plan import PlanRequest, Prepared
 from planning.rig.wishes import Wishes
 from planning.scene.draws import DRAWS
 from planning.scene.samples import Target
-from planning.stages import bounded_projectors, first_projectors
+from planning.steps.prepare import prepared
+from planning.steps.stages import bounded_projectors, first_projectors
 
 FLOORS = (0.0, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8)
 _MANY = 20

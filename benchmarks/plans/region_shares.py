@@ -37,13 +37,13 @@ from planning import load_rig
 from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
 from planning.model.words import percent
-from planning.prepare import prepared
 from planning.projectors.projector_stage import plan_projectors
 from planning.report.assemble import write_plan
 from planning.report.partial_plan import PlanRequest, Prepared
 from planning.rig.wishes import Wishes
 from planning.scene.draws import DRAWS
-from planning.stages import first_projectors, one_device_more, placed
+from planning.steps.prepare import prepared
+from planning.steps.stages import first_projectors, one_device_more, placed
 from solvers import CoverProblem, solve_cover
 
 _DIRECTIONS = 640

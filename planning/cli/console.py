@@ -147,6 +147,26 @@ def reporter(*, quiet: bool) -> Report:
     return report
 
 
+@contextmanager
+def progress(*, quiet: bool) -> Generator[Report]:
+    """Give what shows progress on stderr: a bar on a terminal, else lines.
+
+    A bar is gone when this ends, so that results stand alone.
+    """
+    if quiet or not sys.stderr.isatty() or os.environ.get("TERM") == "dumb":
+        yield reporter(quiet=quiet)
+        return
+    from rich.console import Console
+
+    from planning.report.live_bar import LiveBar
+
+    bar = LiveBar(Console(stderr=True))
+    try:
+        yield bar
+    finally:
+        bar.stop()
+
+
 def print_json(document: Mapping[str, Any]) -> None:
     """Write one JSON object to stdout."""
     click.echo(json.dumps(document, indent=1, allow_nan=False))

@@ -9,6 +9,7 @@ import time
 from typing import NoReturn
 
 import click
+from click.shell_completion import CompletionItem, get_completion_class
 
 from planning.cli.declared.calibrate_declared import calibrate
 from planning.cli.declared.evaluate_declared import evaluate
@@ -57,11 +58,18 @@ class _DefaultGroup(click.Group):
         name, command, others = super().resolve_command(ctx, args)
         return "" if name == self.default else name, command, others
 
+    def shell_complete(
+        self, ctx: click.Context, incomplete: str
+    ) -> list[CompletionItem]:
+        """Offer the default command's options beside the commands."""
+        own = super().shell_complete(ctx, incomplete)
+        return own + self.commands[self.default].shell_complete(ctx, incomplete)
+
     def format_help(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Show the default command's options below the group's own page."""
         super().format_help(ctx, formatter)
         formatter.write_paragraph()
-        formatter.write_text("plan --mesh FILE --max-projectors N")
+        formatter.write_text("plan --mesh FILE --max-projectors N [OPTIONS]")
         self.commands[self.default].format_options(ctx, formatter)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -105,6 +113,21 @@ for _command in (
     *(lens, calibrate, rigs, schema, sample),
 ):
     commands.add_command(_command)
+
+
+@commands.command()
+@click.argument("shell", type=click.Choice(["bash", "zsh", "fish"]))
+def completion(shell: str) -> None:
+    """Print what completes `plan` in a shell.
+
+    \b
+    bash   eval "$(plan completion bash)"              in ~/.bashrc
+    zsh    eval "$(plan completion zsh)"               in ~/.zshrc
+    fish   plan completion fish | source               in config.fish
+    """  # noqa: D301 - click wants the character that \b stands for
+    script = get_completion_class(shell)
+    if script is not None:
+        click.echo(script(commands, {}, "plan", "_PLAN_COMPLETE").source())
 
 
 def _not_built(name: str, purpose: str) -> None:

@@ -13,13 +13,14 @@ from planning.model.plan import InterruptedPlanError, RequirementError
 from planning.model.progress import Report, Stopwatch
 from planning.pipeline import missed_by, plan_rig
 from planning.report.entries.range_entries import ranges_lines
+from planning.report.summary.brief import brief
 from planning.report.summary.summary import summary
 from planning.rig.mounted import Mounted, read_mounted, split_fixed
 from planning.rig.rig import Rig, load_rig
 from planning.scene.interest import Interest, read_selection, read_weight
 from planning.scene.ranges.ranged_body import RangedBody, read_ranges
 
-from .console import print_json, reporter, writable
+from .console import print_json, progress, writable
 from .lines.object_lines import optics_lines, size_lines
 from .saved_plans import SavedPlans
 
@@ -50,13 +51,12 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
     begin, limit = click.get_current_context().obj, options["time_limit"]
     limit = None if limit is None else _OURS * limit
     clock = Stopwatch(time_limit=limit, begin=begin)
-    report = reporter(quiet=options["quiet"])
     path = Path(options["ranges"] or options["meshes"][0])
     result = "plan" if options["max_projectors"] else "evaluation"
     folder = options["output"] or Path(f"{path.name.split('.')[0]}-{result}")
-    saved = SavedPlans(folder, report, patterns=not options["no_patterns"])
     check, interrupted = not options["no_check"], False
-    with writable(folder):
+    with writable(folder), progress(quiet=options["quiet"]) as report:
+        saved = SavedPlans(folder, report, patterns=not options["no_patterns"])
         with clock.ticking():
             rig = load_rig(options["rig_name"], light=options["light"])
             fixed = _fixed(options["fixed"], rig)
@@ -85,7 +85,8 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
         told = {"files": saved.files, "missed": list(missed)}
         print_json(plan.to_document() | told)
     else:
-        click.echo(summary(plan, saved.files, missed))
+        told = summary if options["verbose"] else brief
+        click.echo(told(plan, saved.files, missed))
     if interrupted:
         return InterruptedPlanError.exit_code
     return RequirementError.exit_code if missed else 0

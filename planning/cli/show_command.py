@@ -1,6 +1,6 @@
 """What `plan show` does: what the short summary leaves out, of a plan as written."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -10,9 +10,7 @@ import numpy as np
 from geometry.parallel import n_threads
 from planning.model.plan import RigPlan
 from planning.model.words import labelled, percent
-from planning.report.summary.device_lines import device_lines, gap_lines, mount_lines
-from planning.report.summary.region_lines import region_table
-from planning.report.summary.zone_lines import zone_lines
+from planning.report.summary.sections import SECTIONS
 from planning.verify.audit.devices.camera_figures import (
     CameraFigures,
     Spread,
@@ -21,25 +19,53 @@ from planning.verify.audit.devices.camera_figures import (
 
 from .console import print_json
 
+# Beside what the plan says: recomputed from its poses.
+_CAMERAS = "cameras"
+
 
 def show_command(options: Mapping[str, Any]) -> int:
-    """Print places in the axes of the mesh, devices, and what each camera sees."""
+    """Print the sections that were asked for; places and cameras if none was."""
     plan = RigPlan.load(options["plan_file"])
-    if options["regions"]:
-        if options["as_json"]:
-            print_json({"regions": plan.to_document()["regions"]})
-        else:
-            click.echo("\n".join(region_table(plan)))
-        return 0
-    cameras = camera_figures(plan, threads=options["threads"] or n_threads())
+    names = [section.name for section in SECTIONS]
+    names.insert(1, _CAMERAS)
+    chosen = [name for name in names if options[name] or options["all"]]
     if options["as_json"]:
-        print_json({"cameras": [asdict(camera) for camera in cameras]})
+        _check_json(chosen)
+        print_json(_document(plan, chosen, options["threads"]))
         return 0
-    lines = [*zone_lines(plan), *device_lines(plan), *gap_lines(plan)]
-    lines += [*mount_lines(plan), ""]
-    lines += [line for camera in cameras for line in _camera_lines(camera)]
-    click.echo("\n".join(lines))
+    for name in chosen or (names[0], _CAMERAS):
+        click.echo("\n".join(_section(plan, name, options["threads"])))
     return 0
+
+
+def _check_json(chosen: Sequence[str]) -> None:
+    """Refuse sections whose figures `plan.json` holds already."""
+    words = [name for name in chosen if name not in (_CAMERAS, "regions")]
+    if words:
+        raise click.UsageError(
+            f"--json goes with --cameras and --regions: the figures of --{words[0]} "
+            f"stand in plan.json"
+        )
+
+
+def _document(
+    plan: RigPlan, chosen: Sequence[str], threads: int | None
+) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    if "regions" in chosen:
+        found["regions"] = plan.to_document()["regions"]
+    if _CAMERAS in chosen or not chosen:
+        figures = camera_figures(plan, threads=threads or n_threads())
+        found["cameras"] = [asdict(camera) for camera in figures]
+    return found
+
+
+def _section(plan: RigPlan, name: str, threads: int | None) -> list[str]:
+    if name != _CAMERAS:
+        return next(one for one in SECTIONS if one.name == name).told(plan)
+    figures = camera_figures(plan, threads=threads or n_threads())
+    lines = [line for camera in figures for line in _camera_lines(camera)]
+    return ["CAMERAS: what each sees of the target, and how well.", *lines, ""]
 
 
 def _camera_lines(camera: CameraFigures) -> Iterator[str]:

@@ -19,27 +19,27 @@ from planning.verify.reconstruction.render.photometry import assumed_light
 from planning.verify.reconstruction.scanner import Scanner
 from planning.verify.verification import verify_plan
 
-from .console import given, print_json, reporter
+from .console import given, print_json, progress
 
 
 def verify_command(options: Mapping[str, Any]) -> int:
     """Audit and check a plan; return 0 if every claim holds, 1 if not."""
-    report = reporter(quiet=options["quiet"])
     plan = RigPlan.load(options["plan_file"])
     mesh = None
     if options["mesh"] is not None:
         mesh = _same_scale(options["mesh"], plan)
     truth = None if options["truth"] is None else RigPlan.load(options["truth"])
     threads = options["threads"] or n_threads()
-    verification = verify_plan(
-        plan,
-        mesh,
-        truth=truth,
-        **_rendering(plan, options, threads),
-        seed=options["seed"],
-        threads=threads,
-        progress=report,
-    )
+    with progress(quiet=options["quiet"]) as report:
+        verification = verify_plan(
+            plan,
+            mesh,
+            truth=truth,
+            **_rendering(plan, options, threads),
+            seed=options["seed"],
+            threads=threads,
+            progress=report,
+        )
     if options["as_json"]:
         print_json(verification.to_document())
     else:

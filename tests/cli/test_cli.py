@@ -16,6 +16,7 @@ from planning.cli.main import main
 from planning.cli.other_commands import write_sample
 from planning.model.plan import InterruptedPlanError, RigPlan
 from planning.report.drawing.rig_picture import draw_rig
+from planning.report.summary.brief import COLUMNS, MOST_LINES
 from planning.rig.rig import load_rig
 from planning.verify.verification import verify_plan
 
@@ -97,20 +98,22 @@ def runs(face):
     return folder, found
 
 
-def test_the_main_job_ends_with_0_and_says_what_a_designer_needs(runs):
-    _, (first, _) = runs
+def test_the_main_job_ends_with_0_and_says_what_a_designer_needs(
+    runs, monkeypatch, capsys
+):
+    folder, (first, _) = runs
     assert first.returncode == 0, first.stderr
-    for words in (
-        "2 projectors",
-        "COVERAGE",
-        "MARGINAL",
-        "CHECK    passed",
-        "plan.json",
-        "RINGS    P1",
-        "patterns",
-    ):
+    lines = first.stdout.splitlines()
+    assert lines[0] == "OK       2 projectors and 2 cameras measure face.obj as asked"
+    assert len(lines) <= MOST_LINES
+    assert max(map(len, lines)) <= COLUMNS
+    for words in ("P1 ", "C2 ", "CHECK    passed", "plan.json", "patterns", "show"):
         assert words in first.stdout
-    offered = re.findall(r"(\d+) candidate poses", first.stdout.replace(",", ""))
+    code, shown, _ = in_process(monkeypatch, capsys, "show", folder / "plan1", "--all")
+    assert code == 0
+    for words in ("COVERAGE", "MARGINAL", "RINGS    P1", "COST", "CAMERAS: "):
+        assert words in shown
+    offered = re.findall(r"(\d+) candidate poses", shown.replace(",", ""))
     assert 640 <= int(offered[0]) <= 1000
     assert int(offered[1]) == 480
     assert "plan: " not in first.stdout
@@ -386,6 +389,27 @@ def test_help_imports_nothing_heavy():
     assert "--max-projectors" in done.stdout
 
 
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_a_shell_is_told_how_to_complete(shell, monkeypatch, capsys):
+    code, out, _ = in_process(monkeypatch, capsys, "completion", shell)
+    assert code == 0
+    assert "_PLAN_COMPLETE" in out
+
+
+def test_options_of_the_main_job_are_completed(monkeypatch, capsys):
+    monkeypatch.setenv("COMP_WORDS", "plan --max")
+    monkeypatch.setenv("COMP_CWORD", "1")
+    monkeypatch.setenv("_PLAN_COMPLETE", "bash_complete")
+    _, out, _ = in_process(monkeypatch, capsys)
+    assert out.split() == ["plain,--max-projectors", "plain,--max-cameras"]
+
+
+def test_help_puts_every_option_into_a_group(monkeypatch, capsys):
+    _, out, _ = in_process(monkeypatch, capsys, "--help")
+    _, others = out.split("Others:")
+    assert re.findall(r"--[a-z-]+", others.split("Examples:")[0]) == ["--help"]
+
+
 def test_rigs_lists_every_number_with_its_source(monkeypatch, capsys):
     code, out, _ = in_process(monkeypatch, capsys, "rigs")
     assert code == 0
@@ -434,5 +458,6 @@ def test_a_hollow_bust_exits_1_and_says_how_much_why_and_what_helps(tmp_path):
     assert done.returncode == 1, done.stderr
     assert "can be lit from anywhere" in done.stdout
     assert "shadowed" in done.stdout
-    assert "What would help" in done.stdout
+    assert done.stdout.startswith("NOT MET  ")
+    assert "HELPS    " in done.stdout
     assert (tmp_path / "plan.json").exists()

@@ -15,7 +15,6 @@ from support.plain_shapes import box, cylinder, grid, joined
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import sphere
 from planning.model.progress import Stopwatch
-from planning.prepare import prepared
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import plan_projectors
 from planning.projectors.proved_projectors import prove_fewest
@@ -25,6 +24,7 @@ from planning.rig.rig import load_rig
 from planning.rig.wishes import Wishes
 from planning.scene.lighting import assigned_projectors, lit_margins, lit_stages
 from planning.scene.limits.projector_limits import LIT
+from planning.steps.prepare import prepared
 from solvers.poses.cone import max_margin_direction
 
 EFFORT = Effort(finest=5, budget=3e8, shadows=0.0, most_samples=2000)

@@ -20,7 +20,7 @@ from planning.model.plan import InterruptedPlanError, RequirementError
 from planning.model.progress import Stopwatch
 from planning.pipeline import axes_may_help
 from planning.report.summary.summary import summary
-from planning.stages import with_free_axes
+from planning.steps.stages import with_free_axes
 from planning.verify.audit.audit import audit_plan
 
 README = Path(__file__).resolve().parents[2] / "README.md"

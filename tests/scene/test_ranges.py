@@ -400,7 +400,7 @@ def plan(body, with_few_samples, tmp_path_factory):
         return widest_routes(*words, spare_field=spare_field)
 
     with with_few_samples(), pytest.MonkeyPatch.context() as patch:
-        patch.setattr("planning.stages.widest_routes", noted)
+        patch.setattr("planning.steps.stages.widest_routes", noted)
         made = plan_rig(body, load_rig(rig), max_projectors=8, check=False)
     assert set(spared) == {made.to_document()["ranges"]["guard_rad"]}
     return made

@@ -16,7 +16,6 @@ from planning.model.bodies import Box
 from planning.model.device_poses import moved_to
 from planning.model.planned import PlannedCamera
 from planning.model.progress import Stopwatch
-from planning.prepare import prepared
 from planning.projectors.candidate_set import CandidateSet, CandidateSource
 from planning.projectors.one_fewer import one_fewer
 from planning.projectors.projector_poses import widen_margins
@@ -33,6 +32,7 @@ from planning.scene.lighting import lit_margins, lit_stages
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.workspace.candidates import Candidates
 from planning.scene.workspace.view_tiles import poses_beside, tiled_poses
+from planning.steps.prepare import prepared
 from planning.verify.audit.devices.workspace_claims import outside_by
 
 EFFORT = Effort(finest=4, budget=1e7, shadows=0.0, most_samples=500)

@@ -8,7 +8,7 @@ import click
 
 from planning.cli.console import run
 
-from .plan_declared import check_options, rig_command
+from .plan_declared import GroupedCommand, check_options, rig_command
 
 # What a rig that stands doesn't take: nothing is sought, and the mesh is known. As if
 # they weren't given; `--poses` is what `--fixed` is to a plan.
@@ -24,7 +24,8 @@ _OF_PLANS = {
 
 
 @click.command(
-    params=[p for p in rig_command.params if p.name not in {*_OF_PLANS, "output"}]
+    cls=GroupedCommand,
+    params=[p for p in rig_command.params if p.name not in {*_OF_PLANS, "output"}],
 )
 @click.option(
     "--poses",

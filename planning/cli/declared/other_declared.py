@@ -1,5 +1,6 @@
 """`plan verify`, `accept`, `show`, `rigs`, `schema` and `sample`: their options."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,20 @@ from planning.cli.console import (
 from .export_declared import check_rendering, rendering_options
 from .plan_declared import rig_command
 
+# Of `plan show`, as `planning.report.summary.sections` has them, which takes longer to
+# import than `plan show --help` may.
+_SECTIONS = {
+    "places": "Object, zones and devices in the axes of the mesh.",
+    "cameras": "Of each camera mm per pixel, image filled, distances, angles.",
+    "coverage": "Areas that are lit and measured, and what is left out.",
+    "proofs": "What was proved of the numbers of devices.",
+    "marginal": "What one device more or fewer would change.",
+    "regions": "Every dominant region, where it lies, what of it is measured.",
+    "rings": "How circles are spaced, and what becomes of them.",
+    "check": "The reconstruction from pixels.",
+    "cost": "How long a scan takes; eq. (8).",
+    "all": "All of these.",
+}
 # What says which object and which rig there are.
 _OF_OBJECTS = ("meshes", "files", "unit", "size_mm", "rig_name", "light")
 
@@ -73,20 +88,24 @@ def accept(**options: Any) -> None:  # noqa: ANN401
     run(lambda: accept_command(options), debug=options["debug"])
 
 
+def section_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add an option for each section of `plan show`."""
+    for name, says in reversed(_SECTIONS.items()):
+        command = click.option(f"--{name}", is_flag=True, help=says)(command)
+    return command
+
+
 @click.command()
 @click.argument("plan_file", type=PlanFile(), metavar="DIR[/plan.json]")
-@click.option(
-    "--regions",
-    is_flag=True,
-    help="Instead: every dominant region, where it lies and what of it is reached, lit "
-    "and measured.",
-)
+@section_options
 @threads_option
 @output_options
 def show(**options: Any) -> None:  # noqa: ANN401
-    """Print what the summary leaves out: every place in the axes of the mesh, and of
-    each camera mm per pixel, image filled, distances, triangulation angles.
-    """  # noqa: D205 - click cuts the short help at a blank line
+    """Print what the summary leaves out: places and cameras, or sections by name.
+
+    Without an option: every place in the axes of the mesh, and of each camera mm per
+    pixel, image filled, distances, triangulation angles.
+    """
     from planning.cli.show_command import show_command
 
     run(lambda: show_command(options), debug=options["debug"])

@@ -15,13 +15,65 @@ from planning.cli.console import (
     threads_option,
 )
 
+# What `plan --help` puts together; an option of none of these is told last.
+_GROUPS = {
+    "What is measured": (
+        *("meshes", "ranges", "unit", "size_mm", "up"),
+        *("target", "select", "weight"),
+    ),
+    "With what, and where": (
+        *("max_projectors", "max_cameras", "rig_name", "light", "pattern"),
+        *("ring_axis", "fixed", "poses"),
+    ),
+    "How well": (
+        *("dominant_coverage", "coverage", "min_reachable", "region_coverage"),
+        *("accuracy_mm", "accuracy_of", "robust"),
+    ),
+    "How it is sought": (
+        *("cameras_by", "prove", "seed", "time_limit", "threads", "no_check"),
+    ),
+    "Output": (*("output", "no_patterns", "verbose", "as_json", "quiet", "debug"),),
+}
+_EXAMPLES = (
+    "plan --mesh face.obj --max-projectors 3",
+    "plan --mesh part.stl --max-projectors 4 --target surface --coverage 98%",
+    "plan --mesh part.stl --max-projectors 4 --rig bench.toml --accuracy 0.1 -o out",
+)
 
-@click.command("rig")
+
+class GroupedCommand(click.Command):
+    """A command whose help puts options together by what they are about."""
+
+    def format_options(
+        self, ctx: click.Context, formatter: click.HelpFormatter
+    ) -> None:
+        """Write the groups, each with its options, then examples."""
+        rows = {
+            param.name: row
+            for param in self.get_params(ctx)
+            if (row := param.get_help_record(ctx)) is not None
+        }
+        for title, names in _GROUPS.items():
+            told = [rows.pop(name) for name in names if name in rows]
+            if told:
+                with formatter.section(title):
+                    formatter.write_dl(told)
+        if rows:
+            with formatter.section("Others"):
+                formatter.write_dl(list(rows.values()))
+        if self.name == "rig":
+            with formatter.section("Examples"):
+                for line in _EXAMPLES:
+                    formatter.write_text(line)
+
+
+@click.command("rig", cls=GroupedCommand)
 @click.argument("files", nargs=-1, metavar="[FILE]")
 @click.option(
     "--mesh",
     "meshes",
     multiple=True,
+    type=click.Path(),
     metavar="FILE",
     help="Surface to measure: OBJ, PLY, STL, OFF, GLB, 3MF; .gz, .bz2, .zip too.",
 )
@@ -167,6 +219,7 @@ from planning.cli.console import (
 @click.option(
     "--seed",
     type=click.IntRange(0),
+    metavar="N",
     default=0,
     help="Of every random draw.",
 )
@@ -180,6 +233,11 @@ from planning.cli.console import (
 @click.option("--prove", is_flag=True, help="Spend more work on the continuous bounds.")
 @click.option("--no-check", is_flag=True, help="Skip the check from pixels.")
 @click.option("--no-patterns", is_flag=True, help="Write no pattern images.")
+@click.option(
+    "--verbose",
+    is_flag=True,
+    help="Print all that `plan show --all` does, and not the most important lines.",
+)
 @output_options
 def rig_command(**options: Any) -> None:  # noqa: ANN401
     """Plan a rig for a mesh, or for ranges (the default command)."""

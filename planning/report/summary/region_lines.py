@@ -29,10 +29,10 @@ def region_words(plan: RigPlan, region: RegionRecord) -> str:
 
 def region_lines(plan: RigPlan) -> list[str]:
     """Return how many regions meet the floor, and the worst; none of older plans."""
-    shares = {region.id: min(_shares(areas)) for region, areas in _large(plan)}
-    if not shares:
+    n = len(list(_large(plan)))
+    if not n:
         return labelled("REGIONS", list(_small_lines(plan)))
-    asked, n = plan.requirements.region_coverage, len(shares)
+    asked = plan.requirements.region_coverage
     met = n - sum(areas.floor == "missed" for _, areas in _large(plan))
     floor = (
         f"{met} of {n} meet the floor, {percent(asked)} of what can be lit and of what "
@@ -41,10 +41,20 @@ def region_lines(plan: RigPlan) -> list[str]:
         else f"{count_words(n, 'region')} of at least "
         f"{percent(plan.requirements.region_share)} of the target, no floor"
     )
-    least = min(shares, key=lambda number: shares[number])
-    region, areas = next(pair for pair in _large(plan) if pair[0].id == least)
+    region, areas = min(_large(plan), key=lambda pair: min(_shares(pair[1])))
     worst = f"worst: {region_words(plan, region)}, {_deed(areas)}"
     return labelled("REGIONS", [floor, worst, *_small_lines(plan)])
+
+
+def worst_region(plan: RigPlan) -> str | None:
+    """Say of which large region least is lit or measured; None of older plans."""
+    large = list(_large(plan))
+    if not large:
+        return None
+    region, areas = min(large, key=lambda pair: min(_shares(pair[1])))
+    where = ",".join(_place(plan, region).split(",")[:3])
+    area = area_words(region.area_m2)
+    return f"region {region.id} ({area}{where}) {_deed(areas)}"
 
 
 def _small_lines(plan: RigPlan) -> Iterator[str]:
@@ -98,8 +108,8 @@ def region_table(plan: RigPlan) -> list[str]:
     return lines
 
 
-def floor_shortfalls(plan: RigPlan) -> Iterator[str]:
-    """Yield a sentence for each region that misses its floor: which, why, remedies."""
+def floor_shortfalls(plan: RigPlan) -> Iterator[tuple[str, str, tuple[str, ...]]]:
+    """Yield of each region that misses its floor figures, why, and remedies."""
     missed = [(r, areas) for r, areas in _large(plan) if areas.floor == "missed"]
     accepted = min((min(_shares(areas)) for _, areas in missed), default=0.0)
     for region, areas in missed:
@@ -114,10 +124,10 @@ def floor_shortfalls(plan: RigPlan) -> Iterator[str]:
             if (cause in of_light) == unlit or cause == "blocked_by_obstacle"
         }
         yield (
+            f"region {region.id} {_deed(areas)}, {100 * asked:g} % asked",
             f"{region_words(plan, region)} is {_deed(areas)}, {percent(asked)} is "
-            f"required of each region (--region-coverage). Of it: {areas_line(why)}. "
-            f"What would help: "
-            f"{', or '.join((*_remedies(plan, areas, kind), _accepting(accepted)))}"
+            f"required of each region (--region-coverage). Of it: {areas_line(why)}.",
+            (*_remedies(plan, areas, kind), _accepting(accepted)),
         )
 
 

@@ -1,6 +1,7 @@
 """Which requirements a plan misses, why, and what would help."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 from planning.model.document.certificates import Certificate
 from planning.model.document.coverage_records import Coverage, Relaxation
@@ -17,32 +18,73 @@ from .cause_words import areas_line, causes_line, rounded_down
 from .region_lines import floor_shortfalls
 
 
+@dataclass(frozen=True)
+class Shortfall:
+    """A requirement that a plan misses.
+
+    Attributes:
+        figure: What is reached and what is asked, in a few words.
+        missed: The same with the reason, as one or more sentences.
+        helps: Changes of which each would help, the surest first.
+        between: What stands between them.
+    """
+
+    figure: str
+    missed: str
+    helps: tuple[str, ...] = ()
+    between: str = ", "
+
+    def __str__(self) -> str:
+        """Return all of it as one text."""
+        if not self.helps:
+            return self.missed
+        return f"{self.missed} What would help: {self.between.join(self.helps)}"
+
+
 def shortfalls(plan: RigPlan) -> tuple[str, ...]:
-    """Return one sentence for each requirement that a plan misses."""
+    """Return a text for each requirement that a plan misses."""
+    return tuple(map(str, missing(plan)))
+
+
+def missing(plan: RigPlan) -> Iterator[Shortfall]:
+    """Yield the requirements that a plan misses."""
     required, check = plan.requirements, plan.document.reconstruction
-    return (
-        *_reachable(plan.document, required),
-        *_covered(plan.document, required),
-        *floor_shortfalls(plan),
-        *_robust(plan.document, required),
-        *(() if check is None or check.passed else check.failures),
-    )
+    yield from _reachable(plan.document, required)
+    yield from _covered(plan.document, required)
+    yield from _floors(plan)
+    yield from _robust(plan.document, required)
+    if check is not None and not check.passed:
+        for failure in check.failures:
+            first = failure.split(";")[0].split(". ")[0]
+            yield Shortfall(f"check from pixels: {first}", failure)
 
 
-def _robust(document: PlanDocument, requirements: Requirements) -> Iterator[str]:
+def _floors(plan: RigPlan) -> Iterator[Shortfall]:
+    for figure, missed, helps in floor_shortfalls(plan):
+        yield Shortfall(figure, missed, helps, ", or ")
+
+
+def _robust(document: PlanDocument, requirements: Requirements) -> Iterator[Shortfall]:
     """Whether enough rigs meet what is asked that aren't built exactly as planned."""
     found, robust = document.robust, requirements.robust
     if found is None or robust is None or found.n_met >= found.least:
         return
-    yield (
-        f"{found.n_met} of {found.n_drawn} drawn rigs meet what is asked, at least "
-        f"{found.least} must so that {percent(robust.quantile)} of all do (--robust). "
-        f"What would help: a better [calibration] or [mounting], a larger --accuracy, "
-        f"more devices; `plan tolerance` says what matters most"
+    met = f"{found.n_met} of {found.n_drawn} drawn rigs meet what is asked"
+    yield Shortfall(
+        f"{met}, {found.least} must",
+        f"{met}, at least {found.least} must so that {percent(robust.quantile)} of all "
+        f"do (--robust).",
+        (
+            "a better [calibration] or [mounting]",
+            "a larger --accuracy",
+            "more devices; `plan tolerance` says what matters most",
+        ),
     )
 
 
-def _reachable(document: PlanDocument, requirements: Requirements) -> Iterator[str]:
+def _reachable(
+    document: PlanDocument, requirements: Requirements
+) -> Iterator[Shortfall]:
     """Whether enough of the target, and of what is lit, is within reach."""
     coverage, least = document.coverage, requirements.min_reachable
     areas, unlit = coverage.target, coverage.unreachable_by_cause
@@ -71,23 +113,25 @@ def _reachable(document: PlanDocument, requirements: Requirements) -> Iterator[s
         share = reached / whole
         mount = requirements.workspace.mount_of(kind)
         stepped = mount is not None and mount.is_stepped
-        yield (
+        yield Shortfall(
+            f"{percent(share)} of {what} can be {deed} at all, {percent(least)} asked",
             f"only {percent(share)} of {what} can be {deed} from anywhere in the "
             f"workspace{' that mounts can be set to' * stepped}, {percent(least)} is "
             f"required (--min-reachable); "
-            f"{area_words(whole - reached)} of {area_words(whole)} can't be{why}. "
-            f"What would help: {_steps(relaxations, share)}"
+            f"{area_words(whole - reached)} of {area_words(whole)} can't be{why}.",
+            _steps(relaxations, share),
+            "; ",
         )
 
 
-def _steps(relaxations: tuple[Relaxation, ...], share: float) -> str:
+def _steps(relaxations: tuple[Relaxation, ...], share: float) -> tuple[str, ...]:
     """What each relaxation would reach, and what accepts the share that is reached."""
-    steps = [
-        f"{step.change} would reach {percent(step.reachable_share)}"
-        for step in relaxations
-    ]
-    return "; ".join(
-        (*steps, f"--min-reachable {rounded_down(share)} accepts what there is")
+    return (
+        *(
+            f"{step.change} would reach {percent(step.reachable_share)}"
+            for step in relaxations
+        ),
+        f"--min-reachable {rounded_down(share)} accepts what there is",
     )
 
 
@@ -101,16 +145,16 @@ def _inside(document: PlanDocument) -> str:
     return f"; {area_words(inside)} of it {where}"
 
 
-def _covered(document: PlanDocument, requirements: Requirements) -> Iterator[str]:
+def _covered(document: PlanDocument, requirements: Requirements) -> Iterator[Shortfall]:
     areas, proofs = document.coverage.target, document.certificates
-    for kind, proof, covered, whole, required, deed in (
+    for kind, proof, covered, whole, required, (deed, done) in (
         (
             "projectors",
             proofs.projectors,
             areas.lit_m2,
             areas.reachable_by_projectors_m2,
             requirements.dominant_coverage,
-            "light {} of the reachable target",
+            ("light {} of the reachable target", "lit"),
         ),
         (
             "cameras",
@@ -118,7 +162,7 @@ def _covered(document: PlanDocument, requirements: Requirements) -> Iterator[str
             areas.measured_m2,
             areas.reachable_by_cameras_m2,
             requirements.coverage,
-            "measure {} of what is lit and measurable",
+            ("measure {} of what is lit and measurable", "measured"),
         ),
     ):
         share = covered / whole if whole > 0 else 0.0
@@ -126,12 +170,13 @@ def _covered(document: PlanDocument, requirements: Requirements) -> Iterator[str
             continue
         devices = kind if proof.count > 1 else kind.removesuffix("s")
         verb = deed if proof.count > 1 else deed.replace(" ", "s ", 1)
-        yield (
+        yield Shortfall(
+            f"{percent(share)} {done}, {100 * required:g} % asked",
             f"{proof.count} {devices} {verb.format(percent(share))}, "
             f"{percent(required)} is required; {area_words(whole - covered)} of "
-            f"{area_words(whole)} are left{_bodies(document.coverage, proof)}. "
-            f"{_why(kind, document.coverage)}What would help: "
-            f"{_remedies(kind, proof, requirements, share, document.evaluation)}"
+            f"{area_words(whole)} are left{_bodies(document.coverage, proof)}."
+            f"{_why(kind, document.coverage)}",
+            _remedies(kind, proof, requirements, share, document.evaluation),
         )
 
 
@@ -146,7 +191,7 @@ def _why(kind: str, coverage: Coverage) -> str:
     if not areas:
         return ""
     of = "target" if kind == "projectors" else "lit target"
-    return f"Of the {of}: {areas_line(areas)}. "
+    return f" Of the {of}: {areas_line(areas)}."
 
 
 def _bodies(coverage: Coverage, proof: Certificate) -> str:
@@ -174,7 +219,7 @@ def _remedies(
     requirements: Requirements,
     share: float,
     evaluation: EvaluationRecord | None,
-) -> str:
+) -> tuple[str, ...]:
     needed = proof.needed
     allowed = getattr(requirements, f"max_{kind}")
     option = "dominant-coverage" if kind == "projectors" else "coverage"
@@ -182,11 +227,11 @@ def _remedies(
     if evaluation is not None:
         # A share of 0 is none that an option takes.
         more = f"`plan --fixed {evaluation.path}` keeps these and seeks more {kind}"
-        return f"{more}, or {accept}" if share > 0.0 else more
+        return (more, f"or {accept}") if share > 0.0 else (more,)
     # Where bodies are in the way, more devices may be no help.
     in_vain = needed.count <= proof.but_for_bodies
     if allowed is None or needed.count <= allowed or in_vain:
-        return accept
+        return (accept,)
     bound = (
         "proved over the candidates"
         if needed.lower_bound == needed.count
@@ -197,4 +242,4 @@ def _remedies(
     total = proof.candidates.for_total
     if total is not None and total <= allowed:
         field += (f"a lower --region-coverage (without floors at least {total})",)
-    return ", ".join((option_of_count, *needed.relaxations, *field, f"or {accept}"))
+    return (option_of_count, *needed.relaxations, *field, f"or {accept}")

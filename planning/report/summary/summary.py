@@ -1,4 +1,4 @@
-"""The result that a person reads in ten seconds."""
+"""All that a run has to say (`--verbose`); `brief` is what it says otherwise."""
 
 from collections.abc import Sequence
 
@@ -60,7 +60,7 @@ def _head(plan: RigPlan) -> str:
     size = np.diff(plan.surface.mesh.bounds, axis=0)[0] * 1e3
     cut = "; TRUNCATED" if document.truncated else ""
     cut += f"; {unchecked(plan)}" if document.reconstruction is None else ""
-    cut += _lost_in_field(plan)
+    cut += lost_in_field(plan)
     words = body_words(plan.surface.mesh)
     bodies = f"         {words}\n" if words else ""
     return (
@@ -78,7 +78,7 @@ def _head(plan: RigPlan) -> str:
     )
 
 
-def _lost_in_field(plan: RigPlan) -> str:
+def lost_in_field(plan: RigPlan) -> str:
     """Return a warning where the object is tiny in a camera's field: a wrong unit?"""
     standoff = plan.document.rig.standoff_m
     if standoff is None or not plan.cameras:

@@ -19,8 +19,14 @@ _WORDS = {
 
 def warning_lines(plan: RigPlan) -> list[str]:
     """Return a line for each limit that a device of an evaluated rig breaks."""
+    found = warnings(plan)
+    return ["", *labelled("WARNING", found)] if found else []
+
+
+def warnings(plan: RigPlan) -> list[str]:
+    """Return the sentences of these lines."""
     evaluation = plan.document.evaluation
-    if evaluation is None or not evaluation.violations:
+    if evaluation is None:
         return []
     devices = (*plan.projectors, *plan.cameras)
     names = {device.id: device.existing for device in devices}
@@ -32,4 +38,4 @@ def warning_lines(plan: RigPlan) -> list[str]:
         what = _WORDS[broken.limit].format(by=by_mm, what=broken.what)
         return f"{broken.device}{name} {what}"
 
-    return ["", *labelled("WARNING", [words(v) for v in evaluation.violations])]
+    return [words(v) for v in evaluation.violations]

@@ -25,6 +25,7 @@ from planning.projectors.exposures import with_exposures
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import ProjectorStage, plan_projectors
 from planning.projectors.proved_projectors import prove_fewest
+from planning.proofs import camera_bound, projector_bound
 from planning.proofs.candidate_certificate import larger, unproved, unsought
 from planning.report.advice.camera_relaxations import nothing_measured
 from planning.report.advice.projector_relaxations import nothing_lit
@@ -37,7 +38,6 @@ from planning.rings.ring_stage import space_rings
 from planning.scene.draws import DRAWS
 
 from .prepare import offered
-from .proofs import camera_bound, projector_bound
 
 
 def first_projectors(ready: Prepared, clock: Stopwatch) -> ProjectorStage:

@@ -1,0 +1,288 @@
+"""The result that a person reads in ten seconds: a verdict, and what follows from it.
+
+At most 25 lines of 100 columns; `plan show` prints the rest, section by section.
+"""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from textwrap import wrap
+
+import numpy as np
+
+from geometry.poses import horizontal_axes, pan_tilt_roll
+from planning.model.document.certificates import Certificate
+from planning.model.plan import RigPlan
+from planning.model.words import count_words, percent
+
+from .cause_words import causes_line
+from .check_lines import error_words, unchecked
+from .device_lines import aim_angles, axis_name
+from .proof_lines import user_selection
+from .region_lines import worst_region
+from .shortfall import Shortfall, missing
+from .summary import lost_in_field
+from .warning_lines import warnings
+
+MOST_LINES, COLUMNS = 25, 100
+_LABEL = 9
+# Lines of a block that a longer text is cut to; devices that are told whatever else is.
+_MOST_OF_BLOCK, _FEWEST_DEVICES = 3, 2
+_ELSEWHERE = "plan show"
+
+
+def brief(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
+    """Return a plan as a person wants it first, in millimetres and degrees.
+
+    Args:
+        plan: The plan.
+        files: Where it was written.
+        missed: What of the requirements it misses, as `shortfalls` and the run say.
+    """
+    known = {str(one): one for one in missing(plan)}
+    short = [known.get(line, Shortfall(line, line)) for line in missed]
+    blocks = [
+        *_head(plan, short),
+        *_measured(plan),
+        *_fewest(plan),
+        *_missed(plan, short),
+        *_check(plan),
+        *_end(plan, files),
+    ]
+    rest = [line for label, text, most in blocks for line in _block(label, text, most)]
+    n_head = sum(len(_block(*block)) for block in _head(plan, short))
+    devices = _devices(plan, MOST_LINES - len(rest))
+    return "\n".join([*rest[:n_head], *devices, *rest[n_head:]])
+
+
+_Block = tuple[str, str, int]
+
+
+def _block(label: str, text: str, most: int) -> list[str]:
+    """Wrap a text behind its label; what goes beyond `most` lines ends with dots."""
+    lines = wrap(text, COLUMNS - _LABEL, break_on_hyphens=False) or [""]
+    if len(lines) > most:
+        last = wrap(lines[most - 1], COLUMNS - _LABEL - 4, break_on_hyphens=False)[0]
+        lines = [*lines[: most - 1], f"{last} ..."]
+    return [f"{'' if k else label:<{_LABEL}}{line}" for k, line in enumerate(lines)]
+
+
+def _head(plan: RigPlan, short: Sequence[Shortfall]) -> Iterator[_Block]:
+    document, rig = plan.document, plan.document.rig
+    devices = (
+        f"{count_words(len(plan.projectors), 'projector')} and "
+        f"{count_words(len(plan.cameras), 'camera')}"
+    )
+    state = unchecked(plan)
+    if document.truncated:
+        state = f"TRUNCATED{', NOT CHECKED' * bool(state)}"
+    state = f", {state}" if state else ""
+    path = document.meshes[0].path
+    name = "the mesh" if path is None else Path(path).name
+    if short:
+        figures = [one.figure for one in short[:2]]
+        more = f"; and {len(short) - 2} more" if len(short) > 2 else ""
+        verdict = f"{'; '.join(figures)}{more} ({devices} for {name}){state}"
+        yield "NOT MET", verdict, 2
+    else:
+        stand = document.evaluation
+        as_built = "" if stand is None else f", as they stand in {stand.path}"
+        yield "OK", f"{devices} measure {name} as asked{as_built}{state}", 2
+    x, y, z = np.diff(plan.surface.mesh.bounds, axis=0)[0] * 1e3
+    up = axis_name(plan.requirements.workspace.up)
+    yield (
+        "",
+        f"{x:.0f} x {y:.0f} x {z:.0f} mm, up {up}, rig {rig.name}; target: "
+        f"{_target(plan)}{lost_in_field(plan)}",
+        2,
+    )
+    for line in warnings(plan)[:2]:
+        yield "WARNING", line, 1
+
+
+def _target(plan: RigPlan) -> str:
+    """Say what is to be measured, and how all of it is asked for."""
+    coverage = plan.coverage
+    share = percent(coverage.target.area_m2 / coverage.surface.area_m2, decimals=0)
+    if user_selection(plan) is not None:
+        return f"the {share} of the surface that you chose"
+    if plan.requirements.target == "surface":
+        return "the whole surface"
+    return f"{share} of highest curvature (--target surface: all)"
+
+
+def _devices(plan: RigPlan, room: int) -> list[str]:
+    """Return where devices stand and how they are turned, as many as there is room."""
+    workspace = plan.requirements.workspace
+    centre, up = np.array(workspace.centre), np.array(workspace.up)
+    every = (*plan.projectors, *plan.cameras)
+    # Below stands what is meant by it.
+    told = every if len(every) <= room - 2 else every[: max(room - 3, _FEWEST_DEVICES)]
+    lines = [
+        "         position x, y, z [mm]             pan    tilt    roll   aim azimuth, "
+        "elevation   standoff"
+    ]
+    for device in told:
+        pose = device.world_from_device
+        x, y, z = 1e3 * pose[:3, 3]
+        angles = np.degrees(pan_tilt_roll(pose[:3, :3], up))
+        pan, tilt, roll = np.round(angles, 1) + 0.0
+        azimuth, elevation, _ = aim_angles(device, up)
+        distance = 1e3 * np.linalg.norm(pose[:3, 3] - centre)
+        kept = f"  existing: {device.existing}" if device.existing else ""
+        lines.append(
+            f"{device.id:<4} {x:9.1f} {y:9.1f} {z:9.1f}  {pan:9.1f} {tilt:7.1f} "
+            f"{roll:7.1f}   {azimuth:11.1f} {elevation:11.1f}   {distance:8.1f}{kept}"
+        )
+    if len(told) < len(every):
+        lines.append(f"         and {len(every) - len(told)} more: {_ELSEWHERE}")
+    first = axis_name(horizontal_axes(up)[0])
+    lines.append(
+        f"         optical centres in the axes of the mesh; degrees of the housing, "
+        f"pan about {axis_name(up)} from {first}"
+    )
+    return lines
+
+
+def _measured(plan: RigPlan) -> Iterator[_Block]:
+    areas, asked = plan.coverage.target, plan.requirements
+    sigma, limit = plan.coverage.sigma, asked.triangulation.max_sigma_m
+    lit = _share(areas.lit_m2, areas.reachable_by_projectors_m2)
+    seen = _share(areas.measured_m2, areas.reachable_by_cameras_m2)
+    text = (
+        f"{_share(areas.measured_m2, areas.area_m2)} of the target; of what can be, "
+        f"lit {lit} ({100 * asked.dominant_coverage:g} asked) and measured {seen} "
+        f"({100 * asked.coverage:g})"
+    )
+    yield "MEASURED", text, 2
+    if sigma is None:
+        return
+    most = "" if limit is None else f", {1e3 * limit:g} asked"
+    if asked.triangulation.calibration is None:
+        of = "the rig states no [calibration]"
+    else:
+        of = f"{1e3 * (sigma.noise_median_m or 0.0):.3f} of noise"
+    yield (
+        "EXACT",
+        f"to {1e3 * sigma.median_m:.3f} mm along the normal (median sigma; 95 % within "
+        f"{1e3 * sigma.p95_m:.3f}{most}); {of}",
+        2,
+    )
+
+
+def _fewest(plan: RigPlan) -> Iterator[_Block]:
+    """Say what is known of fewer devices, over the candidates and over every pose."""
+    if plan.document.evaluation is not None:
+        return
+    proofs = plan.document.certificates
+    kinds = {"projector": proofs.projectors, "camera": proofs.cameras}
+    if all(_over_all(proof) for proof in kinds.values()):
+        counts = [count_words(proof.count, kind) for kind, proof in kinds.items()]
+        yield (
+            "FEWEST",
+            f"{' and '.join(counts)}: proved, among candidates and over every pose in "
+            f"the workspace",
+            1,
+        )
+        return
+    for label, (kind, proof) in zip(("FEWEST", ""), kinds.items(), strict=True):
+        yield label, _proved(kind, proof), 1
+
+
+def _over_all(proof: Certificate) -> bool:
+    bound = proof.continuous
+    return (
+        proof.status == "optimal"
+        and proof.needed.count <= proof.count
+        and bound is not None
+        and bound.lower_bound >= proof.count
+    )
+
+
+def _proved(kind: str, proof: Certificate) -> str:
+    needed, least = proof.needed, proof.candidates.lower_bound
+    over, count = "over the candidates", count_words(proof.count, kind)
+    if needed.count > proof.count:
+        words = f"at least {needed.lower_bound} {kind}s proved {over}, "
+        return f"{words}{needed.count} suffice; at most {proof.count} was asked"
+    if proof.status != "optimal":
+        return f"{count}; at least {least} {_are(least)} needed {over}"
+    if proof.continuous is None:
+        return f"{count}: proved {over}; nothing is proved over every pose"
+    if _over_all(proof):
+        return f"{count}: proved, {over} and over every pose in the workspace"
+    least = proof.continuous.lower_bound
+    return (
+        f"{count}: proved {over}; over every pose at least {least} {_are(least)} needed"
+    )
+
+
+def _are(count: int) -> str:
+    return "is" if count == 1 else "are"
+
+
+def _missed(plan: RigPlan, short: Sequence[Shortfall]) -> Iterator[_Block]:
+    """What isn't measured, where it is worst, and the one or two things that help."""
+    worst, areas = worst_region(plan), plan.coverage.target
+    if worst is not None:
+        yield "WORST", worst, 2
+    if short:
+        for label, one in zip(("MISSED", ""), short, strict=False):
+            yield label, one.missed, _MOST_OF_BLOCK
+        if helps := _helps(short):
+            yield "HELPS", "; ".join(helps), _MOST_OF_BLOCK
+        return
+    if causes := plan.coverage.uncovered_by_cause:
+        yield "LEFT OUT", causes_line(causes, areas.area_m2, most=2), 1
+
+
+def _helps(short: Sequence[Shortfall]) -> list[str]:
+    """Return two things that would help, the surest of each shortfall first."""
+    firsts = [one.helps[0] for one in short if one.helps]
+    every = [*firsts, *(text for one in short for text in one.helps[1:])]
+    # The same option with other words is the same help.
+    told = {text.split(" (")[0]: text.removeprefix("or ") for text in reversed(every)}
+    return [told[key] for key in dict.fromkeys(t.split(" (")[0] for t in every)][:2]
+
+
+def _check(plan: RigPlan) -> Iterator[_Block]:
+    check = plan.document.reconstruction
+    if check is None:
+        return
+    rms, p95, bias = check.accuracy_rms_m, check.accuracy_p95_m, check.accuracy_bias_m
+    if rms is None or p95 is None or bias is None:
+        yield "CHECK", "FAILED: no point was measured in the rendered pixels", 1
+        return
+    limits, gone = plan.requirements.check, check.predicted_missing or 0.0
+    verdict = "passed" if check.passed else "FAILED"
+    yield (
+        "CHECK",
+        f"{verdict}: {error_words(rms, p95, bias, limits)}, "
+        f"{percent(gone, decimals=2)} missing ({100 * limits.max_predicted_missing:g})",
+        2,
+    )
+    bounced = check.interreflection
+    if bounced and (warning := bounced.warning()):
+        yield "WARNING", warning, 2
+
+
+def _end(plan: RigPlan, files: Sequence[str]) -> Iterator[_Block]:
+    cost = plan.document.cost
+    if cost.n_frames and not plan.document.evaluation:
+        seconds = (
+            "" if cost.frame_s is None else f", {cost.n_frames * cost.frame_s:.2f} s"
+        )
+        yield "SCAN", f"{count_words(cost.n_frames, 'frame')}{seconds}", 1
+    if not files:
+        return
+    folder = Path(files[0]).parent
+    yield "FILES", f"{folder}: {', '.join(Path(one).name for one in files)}", 2
+    yield (
+        "MORE",
+        f"`{_ELSEWHERE} {folder} --all`: proofs, regions, rings, cost; `plan verify "
+        f"{folder}` checks it again",
+        2,
+    )
+
+
+def _share(part: float, whole: float) -> str:
+    return percent(part / whole) if whole > 0.0 else "none"

@@ -1,0 +1,1 @@
+"""Steps of a run, as `pipeline` takes them one after the other."""
