@@ -20,13 +20,13 @@ from geometry.shapes.sample_head.sample_head import (
 from planning.model.files import write_atomically
 from planning.model.plan import RigPlan
 from planning.model.words import count_words
-from planning.rig.rig_files import (
+from planning.rig.toml.preset_lists import (
     Figure,
     list_calibrations,
     list_presets,
     list_sensors,
-    preset_text,
 )
+from planning.rig.toml.preset_files import preset_text
 from planning.verify.board_images.board import board_for
 from planning.verify.board_images.board_lines import (
     board_document,

@@ -25,6 +25,8 @@ Name = Annotated[str, Field(min_length=1)]
 # How far a written rotation may be from one.
 _ROTATION = 1e-4
 _MOST_SHOWN = 60
+# Keys of a table that need no source.
+_NO_FIGURES = {"name", "device", "description", "sources"}
 # No length in mm, angle or number of pixels or poses is as large; squares of what is
 # larger by far overflow.
 _LARGEST = 1e9
@@ -65,7 +67,7 @@ class SourcedTable(Table):
     def figures(self) -> tuple[str, ...]:
         """Return the dotted names of the figures that were written."""
         names: list[str] = []
-        for key in sorted(self.model_fields_set - {"name", "description", "sources"}):
+        for key in sorted(self.model_fields_set - _NO_FIGURES):
             value = getattr(self, key)
             if isinstance(value, Table):
                 names += [f"{key}.{inner}" for inner in sorted(value.model_fields_set)]

@@ -28,14 +28,15 @@ from .object_size import ObjectSize
 from .obstacle_tables import obstacles_of
 from .rig_devices import (
     device_document,
+    device_notes,
     drawn_edges,
     light_budget,
     parallel_device,
     pinhole_device,
 )
-from .rig_files import read_rig, rig_folder
 from .rig_requirements import build_requirements, build_workspace, limit_notes
 from .rig_tables import MountingTable, ParallelTable, PinholeTable, RigTable, RingsTable
+from .toml.rig_files import read_rig, rig_folder
 from .wishes import Wishes
 
 Light = Literal["diverging", "parallel"]
@@ -134,7 +135,7 @@ class Rig:
         return Body.of(self._projector_table.body)
 
     def camera_body(self) -> Body | None:
-        """Return the body of a camera, None where none is given."""
+        """Return the body of a camera, if it has one."""
         return Body.of(self.table.camera.body)
 
     def mounts(self) -> dict[str, Mount | None]:
@@ -161,7 +162,12 @@ class Rig:
 
     def notes(self) -> tuple[str, ...]:
         """Return what a user should know of these limits, a sentence each."""
-        return limit_notes(self.table.limits)
+        return (*limit_notes(self.table.limits), *self.device_notes())
+
+    def device_notes(self) -> tuple[str, ...]:
+        """Return what nobody published of the devices, a sentence each."""
+        projects = device_notes(self.projector_key, self._projector_table)
+        return (*projects, *device_notes("camera", self.table.camera))
 
     def requirements(
         self,

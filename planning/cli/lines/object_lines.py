@@ -24,5 +24,6 @@ def size_lines(mesh: TriangleMesh) -> Iterator[str]:
 
 
 def optics_lines(rig: Rig, mesh: TriangleMesh) -> list[str]:
-    """Return a line for each device whose optics leave most of its image unused."""
-    return [f"  {note}" for note in optics_notes(rig.fits(mesh))]
+    """Return lines on devices: what isn't known of them, and what they leave unused."""
+    notes = (*rig.device_notes(), *optics_notes(rig.fits(mesh)))
+    return [f"  {note}" for note in notes]
