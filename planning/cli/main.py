@@ -13,17 +13,10 @@ import click
 from planning.cli.declared.calibrate_declared import calibrate
 from planning.cli.declared.evaluate_declared import evaluate
 from planning.cli.declared.export_declared import export
-from planning.cli.declared.other_declared import (
-    accept,
-    lens,
-    rigs,
-    sample,
-    schema,
-    show,
-    verify,
-)
+from planning.cli.declared.other_declared import accept, sample, show, verify
 from planning.cli.declared.plan_declared import rig_command
 from planning.cli.declared.reconstruct_declared import reconstruct
+from planning.cli.declared.rigs_declared import lens, rigs, schema
 from planning.cli.declared.tolerance_declared import tolerance
 
 from .console import stop, stop_signals

@@ -195,15 +195,16 @@ def device_notes(role: str, table: PinholeTable | ParallelTable) -> Iterator[str
     """Yield what a user of a device of the catalogue should know, a sentence each."""
     if table.device is None:
         return
+    # How it is focused is the user's own choice.
     guessed = [
         key
         for key in table.figures()
-        if table.sources.get(key, "").startswith("assumed")
+        if table.sources.get(key, "").startswith("assumed") and "focus" not in key
     ]
     if guessed:
         yield (
-            f"{role} {table.device}: {', '.join(guessed)} assumed, not read anywhere; "
-            f"the sources say why, check your data sheet"
+            f"{role} {table.device}: {', '.join(guessed)} assumed, not read; check "
+            f"your data sheet"
         )
     if isinstance(table, PinholeTable) and table.focus is None:
         yield (
