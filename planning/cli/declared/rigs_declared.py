@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from planning.cli.console import Finite, PlanFile, Positive, debug_option, run
+from planning.cli.console import Finite, Positive, debug_option, run
 
 from .plan_declared import rig_command
 
@@ -160,3 +160,70 @@ def schema(of: str, debug: bool) -> None:
     from planning.cli.devices.rigs_command import schema_command
 
     run(lambda: schema_command(of), debug=debug)
+
+
+class Corner(click.ParamType):  # pyright: ignore[reportMissingTypeArgument]
+    """A place on the desktop in pixels: 1920,0."""
+
+    name = "corner"
+
+    def convert(
+        self,
+        value: Any,  # noqa: ANN401
+        param: click.Parameter | None,
+        ctx: click.Context | None,
+    ) -> Any:  # noqa: ANN401
+        """Return both, or fail as usage."""
+        if not isinstance(value, str):
+            return value
+        parts = value.split(",")
+        if len(parts) != 2 or not all(p.isascii() and p.isdigit() for p in parts):
+            self.fail(f"{value!r} must be two whole numbers, as 1920,0", param, ctx)
+        return int(parts[0][:6]), int(parts[1][:6])
+
+
+@click.command()
+@click.argument("directory", type=click.Path(path_type=Path), metavar="DIR")
+@click.argument("projector", metavar="P1")
+@click.option(
+    "--at",
+    type=Corner(),
+    default="0,0",
+    metavar="X,Y",
+    help="Upper left corner of the projector's screen on the desktop, in pixels.",
+)
+@click.option(
+    "--hold",
+    type=Finite(0.0, 3600.0),
+    metavar="S",
+    help="Seconds that a frame stands, before a capture [default: until a key is "
+    "pressed; with --capture 0.3].",
+)
+@click.option(
+    "--capture",
+    metavar="COMMAND",
+    help="Takes an image of each frame, once for each camera: {file}, {camera}, "
+    "{projector} and {frame} are filled in.",
+)
+@click.option(
+    "--folder",
+    type=click.Path(path_type=Path),
+    metavar="F",
+    help="Where images go, as `plan reconstruct --captures F` reads them.",
+)
+@click.option(
+    "--cameras", metavar="C1,C2", help="Of which cameras [default: all of the plan]."
+)
+@click.option("--quiet", is_flag=True, help="No progress on stderr.")
+@debug_option
+def play(**options: Any) -> None:  # noqa: ANN401
+    """Show a projector's frames in order, full-screen, and capture each.
+
+    Escape ends it; without --hold any other key shows the next frame.
+    """
+    from planning.cli.devices.play_command import play_command
+
+    directory: Path = options["directory"]
+    if directory.name == "plan.json":
+        options["directory"] = directory.parent
+    run(lambda: play_command(options), debug=options["debug"])

@@ -81,7 +81,8 @@ def rig_schema(page: str) -> str:
         section = _section(name, schema)
         for key, entry in table.get("properties", {}).items():
             _without_null(entry)
-            entry.pop("title", None)
+            for noise in ("title", "default")[: 2 if "$ref" in entry else 1]:
+                entry.pop(noise, None)
             found = words.get((section, key)) or words.get(("", key), "")
             text = _NAMED.get(key) or found
             unit = _UNITS.get(key.rpartition("_")[2], "") if "_" in key else ""
