@@ -54,8 +54,7 @@ def row(name: str, description: str) -> str:
     plan = json.loads(run.stdout)
     target = plan["coverage"]["target"]
     measured, reachable, area = (
-        target[key]
-        for key in ("measured_m2", "reachable_by_cameras_m2", "area_m2")
+        target[key] for key in ("measured_m2", "reachable_by_cameras_m2", "area_m2")
     )
     sigma = plan["coverage"]["sigma"]
     missed = "; ".join(plan["missed"]) or "nothing"

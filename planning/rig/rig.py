@@ -145,16 +145,15 @@ class Rig:
 
     def fit(self, role: str, size: ObjectSize) -> LensFit:
         """Return how `camera` or `projector` suits an object, see `LensFit`."""
-        projects = role == "projector"
-        table = self._projector_table if projects else self.table.camera
-        device = self._projector if projects else self._camera
+        table, device = self.table.camera, self._camera
+        if role == "projector":
+            table, device = self._projector_table, self._projector
         stands = self.standoff_m, self.standoff_play_m
         return LensFit(role, table, device, *stands, size)
 
     def fits(self, mesh: TriangleMesh) -> tuple[LensFit, ...]:
         """Return how camera and projector suit an object."""
-        size = ObjectSize.of(mesh)
-        return tuple(self.fit(role, size) for role in ("camera", "projector"))
+        return tuple(self.fit(r, ObjectSize.of(mesh)) for r in ("camera", "projector"))
 
     def outer_ring_radius(self) -> float:
         """Return the outermost ring, wherever the ring axis is turned or shifted to."""
@@ -166,8 +165,8 @@ class Rig:
 
     def device_notes(self) -> tuple[str, ...]:
         """Return what nobody published of the devices, a sentence each."""
-        projects = device_notes(self.projector_key, self._projector_table)
-        return (*projects, *device_notes("camera", self.table.camera))
+        lit = device_notes(self.projector_key, self._projector_table)
+        return (*lit, *device_notes("camera", self.table.camera))
 
     def requirements(
         self,

@@ -32,7 +32,7 @@ class FrameWindow:
             ) from None
         # The virtual desktop spans all screens.
         desktop = root.winfo_vrootwidth(), root.winfo_vrootheight()
-        if any(place + side > whole for place, side, whole in zip(at, size, desktop)):
+        if at[0] + size[0] > desktop[0] or at[1] + size[1] > desktop[1]:
             root.destroy()
             raise InputError(
                 f"frames of {size[0]} x {size[1]} px at {at[0]},{at[1]} don't fit the "

@@ -90,8 +90,8 @@ class _Capture:
                     else f"wrote no {file}"
                 )
                 raise CapturesError(
-                    f"--capture {shlex.join(words)}: {what} ({said or 'it said nothing'}"
-                    f"); correct the command, remove {file.parent} and play again"
+                    f"--capture {shlex.join(words)}: {what} ({said or 'no message'}); "
+                    f"correct the command, remove {file.parent} and play again"
                 )
             self.report(f"  {file}")
 

@@ -37,7 +37,7 @@ def rigs_command() -> int:
         "",
         "plan rigs show NAME            one as the file that it is, to change",
         "plan rigs show NAME --sources  every number of one with its source",
-        "plan rigs devices              projectors, cameras and lenses to name in a rig",
+        "plan rigs devices              projectors, cameras and lenses for rig files",
         "plan rigs new                  a rig file of your own, from a few answers",
     ]
     click.echo("\n".join(lines))

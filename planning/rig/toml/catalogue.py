@@ -120,7 +120,9 @@ def device_table(role: str, device: object, given: dict[str, Any]) -> dict[str, 
         return _projector(device, given)
     if role == "camera":
         return _camera(device, given)
-    raise ValueError("takes no device: the catalogue has no projector of parallel light")
+    raise ValueError(
+        "takes no device: the catalogue has no projector of parallel light"
+    )
 
 
 def split_camera(device: str) -> tuple[CameraEntry, LensEntry | float | None]:

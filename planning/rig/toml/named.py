@@ -68,7 +68,9 @@ class Named:
         if (device := given.get("device")) is not None:
             table = device_table(role, device, given)
         file = given.get("calibration")
-        table = lay_device_over(table, {k: v for k, v in given.items() if k != "calibration"})
+        table = lay_device_over(
+            table, {k: v for k, v in given.items() if k != "calibration"}
+        )
         if file is None:
             return table
         if role == "parallel_projector" or not isinstance(file, str):

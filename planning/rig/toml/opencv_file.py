@@ -1,11 +1,11 @@
 """Intrinsics as OpenCV writes them: FileStorage in YAML or XML, or ROS camera_info.
 
-Read strictly and by ourselves: of the file only two matrices and the image's size count.
+Read strictly and by ourselves: of a file two matrices and the image's size count.
 """
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -175,10 +175,10 @@ def _xml(text: str) -> dict[str, object]:
         raise ValueError(f"not XML ({error}); correct that place") from None
     entries: dict[str, object] = {}
     for node in root:
-        of: Callable[[str], str] = lambda key, node=node: node.findtext(key) or ""
-        rows, cols = _whole(of("rows")), _whole(of("cols"))
-        is_matrix = rows is not None and cols is not None
-        found = (rows, cols, of("data")) if is_matrix else (node.text or "").strip()
+        rows, cols = (_whole(node.findtext(key)) for key in ("rows", "cols"))
+        found: object = (node.text or "").strip()
+        if rows is not None and cols is not None:
+            found = rows, cols, node.findtext("data") or ""
         _keep(entries, node.tag, found)
     return entries
 

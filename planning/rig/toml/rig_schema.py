@@ -119,7 +119,7 @@ def _section(table: str, schema: Mapping[str, Any]) -> str:
 
 
 def _words(page: str) -> dict[tuple[str, str], str]:
-    """Return what rows of the page say of keys, by table; by "" whichever came first."""
+    """Return what rows of the page say of keys, by table; of "" whichever is first."""
     words: dict[tuple[str, str], str] = {}
     for tables, cells, meaning in _rows(page):
         text, keys = _plain(cells[meaning]), _KEY.findall(cells[0])
