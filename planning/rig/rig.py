@@ -160,13 +160,10 @@ class Rig:
         return light_of(self._projector).image_ring(self.ring_offset)
 
     def notes(self) -> tuple[str, ...]:
-        """Return what a user should know of these limits, a sentence each."""
-        return (*limit_notes(self.table.limits), *self.device_notes())
-
-    def device_notes(self) -> tuple[str, ...]:
-        """Return what nobody published of the devices, a sentence each."""
+        """Return what a user should know of limits and devices, a sentence each."""
         lit = device_notes(self.projector_key, self._projector_table)
-        return (*lit, *device_notes("camera", self.table.camera))
+        seen = device_notes("camera", self.table.camera)
+        return (*limit_notes(self.table.limits), *lit, *seen)
 
     def requirements(
         self,
@@ -296,11 +293,11 @@ class Rig:
     @property
     def _projector_table(self) -> PinholeTable | ParallelTable:
         """The projector of this light as written."""
-        table = getattr(self.table, self.projector_key)
+        key = self.projector_key
+        table = getattr(self.table, key)
         if table is None:
             raise RigError(
-                f"rig {self.name}: light '{self.light}' needs a table "
-                f"[{self.projector_key}]; "
+                f"rig {self.name}: light '{self.light}' needs a table [{key}]; "
                 f'add it, or lay the file over one that has it: base = "default"'
             )
         return table
@@ -309,12 +306,13 @@ class Rig:
 def _check_devices(rig: Rig) -> None:
     """Refuse a rig whose devices can't be sharp at the standoff."""
     devices = {"projector": rig.projector_device(), "camera": rig.camera_device()}
-    for role, device in devices.items():
-        low, high = device.range_m
-        if not low <= rig.standoff_m <= high:
-            raise InfeasibleLimitsError(
-                f"rig {rig.name}: {unsharp(rig.fit(role, ObjectSize.ball(0.0)))}"
-            )
+    blurred = [
+        f"rig {rig.name}: {unsharp(rig.fit(role, ObjectSize.ball(0.0)))}"
+        for role, device in devices.items()
+        if not device.range_m[0] <= rig.standoff_m <= device.range_m[1]
+    ]
+    if blurred:
+        raise InfeasibleLimitsError("\n".join(blurred))
     if not math.isfinite(rig.outer_ring_radius()):
         raise RigError(
             f"rig {rig.name}: rings.tilt_deg = {rig.table.rings.tilt_deg:g} turns the "

@@ -197,4 +197,4 @@ def _warnings(path: Path, object_mm: float) -> Iterator[str]:
             )
         elif not fit.is_sharp:
             yield f"not all of it is sharp for the {role}; {fit.advice()}"
-    yield from (f"  {note}" for note in rig.device_notes())
+    yield from (f"  {note}" for note in rig.notes())

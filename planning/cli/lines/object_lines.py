@@ -24,6 +24,6 @@ def size_lines(mesh: TriangleMesh) -> Iterator[str]:
 
 
 def optics_lines(rig: Rig, mesh: TriangleMesh) -> list[str]:
-    """Return lines on devices: what isn't known of them, and what they leave unused."""
-    notes = (*rig.device_notes(), *optics_notes(rig.fits(mesh)))
+    """Return lines on devices: what to know of them, and what they leave unused."""
+    notes = (*rig.notes(), *optics_notes(rig.fits(mesh)))
     return [f"  {note}" for note in notes]

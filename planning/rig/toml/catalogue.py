@@ -164,7 +164,7 @@ def _camera(device: str, given: dict[str, Any]) -> dict[str, Any]:
             )
         return table
     sources = table["sources"]
-    if isinstance(lens, float):
+    if not isinstance(lens, LensEntry):
         table |= {"focal_mm": lens, "range_mm": [10.0 * lens, FARTHEST_MM]}
         table["name"] += f" with a {lens:g} mm lens"
         sources["focal_mm"] = _PLAIN_LENS

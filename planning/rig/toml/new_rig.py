@@ -175,10 +175,10 @@ def _focus_projector(
 def _focus_camera(device: _Device, near: float, far: float, chosen: list[str]) -> None:
     pixel_um, focal = device.table["pixel_um"], device.table["focal_mm"]
     most = min(_CLOSED, device.stops[1])
-    for blur in range(1, _MOST_BLUR_PX + 1):
-        need, distance = _stop(focal, blur * pixel_um, near, far)
-        if 1.05 * need <= most:
-            break
+    need, distance = _stop(focal, pixel_um, near, far)
+    # What a stop must be falls as the blur that is let pass.
+    blur = min(max(1, math.ceil(1.05 * need / most)), _MOST_BLUR_PX)
+    need /= blur
     stop = next((s for s in _STOPS if s >= 1.05 * need and s >= device.stops[0]), most)
     _write_focus(device, distance, stop, float(blur))
     chosen.append(
@@ -218,8 +218,8 @@ def _text(
     sheet = float(f"{_SHEET_MM * min(1.0, distance / 1e3):.2g}")
     lines = [
         "# Written by `plan rigs new`; every key: docs/reference/rig-files.md.",
-        "# For completion: plan schema --of rig > rig.schema.json, and in your editor a",
-        "# first line of its own: #:schema ./rig.schema.json",
+        "# For completion: plan schema --of rig > rig.schema.json; write on top, a line",
+        "# of its own: #:schema ./rig.schema.json",
         "",
         f"name = {json.dumps(answers.name)}",
         f'description = "for objects up to {answers.object_mm:g} mm"',
@@ -228,8 +228,8 @@ def _text(
         *_table("projector", projector),
         '# K and distortion as measured by OpenCV: calibration = "camera.yml"',
         *_table("camera", camera),
-        "# From device to surface. Where devices may stand is [workspace]: rooms, floors,",
-        "# mounting planes, keep-out volumes; without it anywhere about the object.",
+        "# From device to surface. Rooms, floors and mounting planes: [workspace];",
+        "# without it devices may stand anywhere about the object.",
         "[placement]",
         f"standoff_mm = {distance:.1f}",
         f"standoff_play_mm = {float(f'{_PLAY * distance:.3g}')}",
