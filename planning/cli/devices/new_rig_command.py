@@ -34,7 +34,7 @@ def new_rig_command(options: Mapping[str, Any]) -> int:
         raise click.UsageError("give --projector or --throw-ratio, not both")
     if options["camera"] and options["sensor_px"]:
         raise click.UsageError("give --camera or --sensor-px, not both")
-    asks = not known and sys.stdin.isatty()
+    asks = not known and _is_terminal()
     if not known and not asks:
         raise click.UsageError(
             "give at least --object-mm S, the longest side of what you measure; on a "
@@ -67,6 +67,10 @@ _KEYS = (
     *("object_mm", "projector", "throw_ratio", "projector_px", "offset_percent"),
     *("camera", "sensor_px", "pixel_um", "focal_mm", "distance_mm"),
 )
+
+
+def _is_terminal() -> bool:
+    return sys.stdin.isatty()
 
 
 def _assumed(known: dict[str, Any], chosen: list[str]) -> Answers:

@@ -218,8 +218,8 @@ def _text(
     sheet = float(f"{_SHEET_MM * min(1.0, distance / 1e3):.2g}")
     lines = [
         "# Written by `plan rigs new`; every key: docs/reference/rig-files.md.",
-        "# For completion: plan schema --of rig > rig.schema.json; write on top, a line",
-        "# of its own: #:schema ./rig.schema.json",
+        "# For completion: plan schema --of rig > rig.schema.json, and on top, as a",
+        "# line of its own: #:schema ./rig.schema.json",
         "",
         f"name = {json.dumps(answers.name)}",
         f'description = "for objects up to {answers.object_mm:g} mm"',
