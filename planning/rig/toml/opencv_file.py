@@ -61,7 +61,7 @@ def read_intrinsics(path: Path) -> Intrinsics:
     Raises:
         RigError: It says in one line what the file lacks or holds instead.
     """
-    with reading(path, RigError):
+    with reading(path, RigError, absent="; it is looked for beside the rig file"):
         content = file_content(path)
     try:
         if len(content) > _LARGEST:

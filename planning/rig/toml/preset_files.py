@@ -51,7 +51,8 @@ def names_in(*folder: str) -> tuple[str, ...]:
 
 def near(name: str, known: tuple[str, ...]) -> str:
     """Say which name may have been meant, or all that there are."""
-    close = difflib.get_close_matches(name, known, n=1)
+    within = [each for each in known if name and name.lower() in each.lower()]
+    close = difflib.get_close_matches(name, known, n=1) or within[:1]
     return f"did you mean {close[0]}?" if close else f"there are: {', '.join(known)}."
 
 

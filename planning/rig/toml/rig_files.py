@@ -32,10 +32,12 @@ def read_rig(name_or_path: str | Path) -> RigTable:
     if _is_path(name_or_path):
         where, tables = str(name_or_path), _read_file(Path(name_or_path))
     else:
-        where, tables = (
-            f"rig {name_or_path}",
-            tomllib.loads(preset_text(str(name_or_path))),
-        )
+        name = str(name_or_path)
+        if name not in preset_names() and Path(f"{name}.toml").is_file():
+            raise RigError(
+                f"rig {name}: no such preset; did you mean the file {name}.toml?"
+            )
+        where, tables = f"rig {name}", tomllib.loads(preset_text(name))
     named = Named(rig_folder(name_or_path))
     tables, table = named.resolved(tables), None
     faults = named.faults
