@@ -50,7 +50,7 @@ class FrameWindow:
         root.bind("<Key>", lambda event: self._keys.append(event.keysym))
         root.attributes("-topmost", True)
         root.focus_force()
-        root.update()
+        root.wait_visibility()
 
     def show(self, path: Path) -> None:
         """Show a frame.
@@ -71,6 +71,8 @@ class FrameWindow:
         self._image = ImageTk.PhotoImage(image, master=self._root)
         self._label.configure(image=self._image)
         self._root.update()
+        # An answer from the screen says that it drew what was sent before.
+        self._root.winfo_pointerxy()
 
     def wait(self, seconds: float | None) -> None:
         """Let a frame stand; None: until a key is pressed.

@@ -70,6 +70,8 @@ def devices_command(kind: str | None) -> int:
         for device in devices:
             price = _value(device.figures, "price")
             more = f", {price}" if price else ""
+            read = sum(each.source.startswith("read") for each in device.figures)
+            more += f" [{read} of {len(device.figures)} figures read, others assumed]"
             click.echo(f"  {device.name:<{width}}  {device.description}{more}")
     click.echo(
         'in a rig file: projector = "NAME", camera = "NAME + LENS" or "NAME + 16mm"; '
