@@ -1,10 +1,12 @@
 """`plan rigs` and what hangs on it; `plan play` on a screen that nobody looks at."""
 
+import contextlib
 import json
 import os
 import shutil
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -138,11 +140,19 @@ def screen(monkeypatch):
         pytest.skip("no Xvfb, so no screen to show frames on")
     read, write = os.pipe()
     words = ["Xvfb", "-displayfd", str(write), "-screen", "0", "200x100x24"]
+    # Without it the screen goes away with whoever looked at it last.
+    words += ["-noreset", "-nolisten", "tcp"]
     server = subprocess.Popen(words, pass_fds=[write], stderr=subprocess.DEVNULL)
     os.close(write)
-    display = f":{os.read(read, 20).decode().strip()}"
-    os.close(read)
+    # It writes its number in pieces.
+    with os.fdopen(read) as answer:
+        display = f":{answer.readline().strip()}"
     monkeypatch.setenv("DISPLAY", display)
+    for _ in range(100):
+        with contextlib.suppress(OSError):
+            assert ImageGrab.grab(xdisplay=display).size == (200, 100)
+            break
+        time.sleep(0.1)
     yield display
     server.terminate()
     server.wait()
@@ -155,7 +165,6 @@ def test_frames_are_shown_pixel_by_pixel_and_captured(patterns, screen, tmp_path
         "image = ImageGrab.grab(bbox=(30, 20, 94, 68), xdisplay=sys.argv[1])\n"
         "image.convert('L').save(sys.argv[2])\n"
     )
-    assert ImageGrab.grab(xdisplay=screen).size == (200, 100)
     folder = tmp_path / "captures"
     words = ["play", str(patterns.parent), "P1", "--at", "30,20", "--hold", "0.1"]
     words += ["--folder", str(folder)]
