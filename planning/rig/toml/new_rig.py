@@ -21,8 +21,9 @@ _CLOSED = 11.0
 _MOST_BLUR_PX = 12
 _PROJECTOR_STOP, _PROJECTOR_BLUR_PX = 2.0, 5.0
 _PLAY = 0.05
-# Position that a dot sheet leaves at 1 m, and where sigma grows with the object.
-_SHEET_MM, _FINE_MM, _COARSE = 0.04, 600.0, 5e-4
+# Position that a dot sheet leaves at 1 m. Its angle, 0.0075 degrees, moves points by
+# 1.3e-4 of the distance; two and a half times that is what many rigs can keep.
+_SHEET_MM, _SIGMA_MM, _SIGMA_SHARE = 0.04, 0.3, 2.5 * 1.3e-4
 _STATED = "stated to `plan rigs new`"
 _FITS = "assumed: so that the object's depth is sharp"
 
@@ -243,10 +244,10 @@ def _text(
         'position_mm = "assumed: that of the dot sheet at 1 m, in proportion"',
         "",
     ]
-    if answers.object_mm > _FINE_MM:
-        sigma = math.ceil(10.0 * _COARSE * answers.object_mm) / 10.0
+    sigma = math.ceil(10.0 * _SIGMA_SHARE * distance) / 10.0
+    if sigma > _SIGMA_MM + 0.1:
         lines += [
-            "# Large objects are measured from farther away, less finely.",
+            "# From so far away a calibration leaves more.",
             "[limits]",
             f"max_sigma_mm = {sigma}",
             "",
@@ -256,7 +257,7 @@ def _text(
             f"max_bias_mm = {sigma / 8:.2g}",
             "",
         ]
-        chosen.append(f"sigma up to {sigma:g} mm, for an object so large")
+        chosen.append(f"sigma up to {sigma:g} mm, from so far away")
     return "\n".join(lines)
 
 
