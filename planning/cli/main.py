@@ -14,17 +14,10 @@ from click.shell_completion import CompletionItem, get_completion_class
 from planning.cli.declared.calibrate_declared import calibrate
 from planning.cli.declared.evaluate_declared import evaluate
 from planning.cli.declared.export_declared import export
-from planning.cli.declared.other_declared import (
-    accept,
-    lens,
-    rigs,
-    sample,
-    schema,
-    show,
-    verify,
-)
+from planning.cli.declared.other_declared import accept, sample, show, verify
 from planning.cli.declared.plan_declared import rig_command
 from planning.cli.declared.reconstruct_declared import reconstruct
+from planning.cli.declared.rigs_declared import lens, play, rigs, schema
 from planning.cli.declared.tolerance_declared import tolerance
 
 from .console import stop, stop_signals
@@ -98,8 +91,10 @@ def commands() -> None:
     plan show face-plan/plan.json             every place in mesh axes, camera by camera
     plan tolerance face-plan --mount 2mm,0.2deg
                                               how well devices must be mounted
+    plan rigs                                 rigs and devices to plan with; rigs new
     plan lens --mesh face.obj                 which lens and focus suit an object
     plan calibrate face-plan/plan.json        images of a board that calibrate the rig
+    plan play face-plan P1 --hold 1           a projector's frames, and captures of them
     plan reconstruct face-plan/plan.json      a cloud from rendered or captured images
     plan export face-plan --to mitsuba        scenes for a renderer that isn't ours
 
@@ -110,7 +105,7 @@ def commands() -> None:
 
 for _command in (
     *(rig_command, evaluate, verify, accept, show, reconstruct, tolerance, export),
-    *(lens, calibrate, rigs, schema, sample),
+    *(lens, calibrate, play, rigs, schema, sample),
 ):
     commands.add_command(_command)
 

@@ -1,9 +1,8 @@
-"""What `plan rigs`, `schema`, `sample`, `export` and `calibrate` do."""
+"""What `plan sample`, `export` and `calibrate` do."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -20,13 +19,6 @@ from geometry.shapes.sample_head.sample_head import (
 from planning.model.files import write_atomically
 from planning.model.plan import RigPlan
 from planning.model.words import count_words
-from planning.rig.rig_files import (
-    Figure,
-    list_calibrations,
-    list_presets,
-    list_sensors,
-    preset_text,
-)
 from planning.verify.board_images.board import board_for
 from planning.verify.board_images.board_lines import (
     board_document,
@@ -88,40 +80,6 @@ def _pair(
             f"{option} {text} must be two numbers from {low:g} to {high:g}: {example}"
         )
     return first, second
-
-
-def rigs_command(name: str | None) -> int:
-    """Print the presets with the source of every number, or one's file as it is."""
-    if name is not None:
-        click.echo(preset_text(name), nl=False)
-        return 0
-    for preset in list_presets():
-        click.echo(f"{preset.name}: {preset.description}")
-        for role, device in preset.devices.items():
-            click.echo(f"  {role}: {device}")
-            _print_figures(f for f in preset.figures if f.device == role)
-    for what, listed in (
-        ("calibrations, for `from` of [calibration]", list_calibrations()),
-        ("sensors, for `sensor` of [photometry]", list_sensors()),
-    ):
-        click.echo(f"{what} in a rig file:")
-        for preset in listed:
-            click.echo(f"  {preset.description}")
-            _print_figures(preset.figures)
-    return 0
-
-
-def _print_figures(figures: Iterable[Figure]) -> None:
-    for figure in figures:
-        click.echo(f"    {figure.key} = {figure.value}")
-        click.echo(f"        {figure.source}")
-
-
-def schema_command() -> int:
-    """Print the JSON Schema of a plan file, as it is shipped."""
-    text = files("planning.model").joinpath("plan.schema.json").read_text()
-    click.echo(text, nl=False)
-    return 0
 
 
 def sample_command(output: Path, faces: int, variant: int | None) -> int:

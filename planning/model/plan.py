@@ -25,7 +25,7 @@ _NOT_PLANNED = {
     *("cost", "timings_s"),
 }
 # So many faults of a file are told; a file of another kind has hundreds.
-_MOST_FAULTS = 3
+_MOST_FAULTS = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,14 +156,15 @@ def _document(text: str | bytes, where: str) -> PlanDocument:
         for record in (*document.projectors, *document.cameras):
             record.planned()
     except ValidationError as error:
-        raise PlanFileError(f"{where}: {_faults(error)}; plan again") from None
+        faults = [f"{where}: {fault}; plan again" for fault in _faults(error)]
+        raise PlanFileError("\n".join(faults)) from None
     except ValueError as error:
         raise PlanFileError(f"{where}: broken plan ({error}); plan again") from None
     return document
 
 
-def _faults(error: ValidationError) -> str:
-    """Return the first faults: where, the value, the rule."""
+def _faults(error: ValidationError) -> list[str]:
+    """Return the faults, up to so many: where, the value, the rule."""
     entries = error.errors(include_url=False)
     faults: list[str] = []
     for entry in entries[:_MOST_FAULTS]:
@@ -175,7 +176,7 @@ def _faults(error: ValidationError) -> str:
         missing = entry["type"] == "missing"
         faults.append(f"{where} is missing" if missing else f"{where} = {value} {rule}")
     more = len(entries) - len(faults)
-    return ", ".join(faults) + (f", and {more} more faults" if more else "")
+    return [*faults, f"{more} more faults"] if more else faults
 
 
 class RequirementError(PlanningError):

@@ -4,7 +4,14 @@ from collections.abc import Iterator
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    WithJsonSchema,
+    model_validator,
+)
 from pydantic_core import ErrorDetails
 
 from geometry.arrays import Array
@@ -12,8 +19,25 @@ from geometry.arrays import Array
 from .words import percent_as_share
 
 Positive = Annotated[float, Field(gt=0.0)]
-Share = Annotated[float, BeforeValidator(percent_as_share), Field(gt=0.0, le=1.0)]
-ShareOrNone = Annotated[float, BeforeValidator(percent_as_share), Field(ge=0.0, le=1.0)]
+# As JSON Schema has it: a number, or percent as text.
+_SHARE = {
+    "anyOf": [
+        {"type": "number", "minimum": 0, "maximum": 1},
+        {"type": "string", "pattern": "^[0-9.]+ ?%$"},
+    ]
+}
+Share = Annotated[
+    float,
+    BeforeValidator(percent_as_share),
+    Field(gt=0.0, le=1.0),
+    WithJsonSchema(_SHARE),
+]
+ShareOrNone = Annotated[
+    float,
+    BeforeValidator(percent_as_share),
+    Field(ge=0.0, le=1.0),
+    WithJsonSchema(_SHARE),
+]
 Acute = Annotated[float, Field(gt=0.0, lt=90.0)]
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 PositivePair = Annotated[list[Positive], Field(min_length=2, max_length=2)]
@@ -25,6 +49,8 @@ Name = Annotated[str, Field(min_length=1)]
 # How far a written rotation may be from one.
 _ROTATION = 1e-4
 _MOST_SHOWN = 60
+# Keys of a table that need no source.
+_NO_FIGURES = {"name", "device", "description", "sources"}
 # No length in mm, angle or number of pixels or poses is as large; squares of what is
 # larger by far overflow.
 _LARGEST = 1e9
@@ -36,7 +62,13 @@ def _off_is_none(value: object) -> object:
 
 
 # TOML has no null: a limit that isn't to bind is written "off".
-Limit = Annotated[Positive | None, BeforeValidator(_off_is_none)]
+Limit = Annotated[
+    Positive | None,
+    BeforeValidator(_off_is_none),
+    WithJsonSchema(
+        {"anyOf": [{"type": "number", "exclusiveMinimum": 0}, {"const": "off"}]}
+    ),
+]
 
 
 class Table(BaseModel):
@@ -65,7 +97,7 @@ class SourcedTable(Table):
     def figures(self) -> tuple[str, ...]:
         """Return the dotted names of the figures that were written."""
         names: list[str] = []
-        for key in sorted(self.model_fields_set - {"name", "description", "sources"}):
+        for key in sorted(self.model_fields_set - _NO_FIGURES):
             value = getattr(self, key)
             if isinstance(value, Table):
                 names += [f"{key}.{inner}" for inner in sorted(value.model_fields_set)]

@@ -28,14 +28,15 @@ from .object_size import ObjectSize
 from .obstacle_tables import obstacles_of
 from .rig_devices import (
     device_document,
+    device_notes,
     drawn_edges,
     light_budget,
     parallel_device,
     pinhole_device,
 )
-from .rig_files import read_rig, rig_folder
 from .rig_requirements import build_requirements, build_workspace, limit_notes
 from .rig_tables import MountingTable, ParallelTable, PinholeTable, RigTable, RingsTable
+from .toml.rig_files import read_rig, rig_folder
 from .wishes import Wishes
 
 Light = Literal["diverging", "parallel"]
@@ -134,7 +135,7 @@ class Rig:
         return Body.of(self._projector_table.body)
 
     def camera_body(self) -> Body | None:
-        """Return the body of a camera, None where none is given."""
+        """Return the body of a camera, if it has one."""
         return Body.of(self.table.camera.body)
 
     def mounts(self) -> dict[str, Mount | None]:
@@ -144,24 +145,25 @@ class Rig:
 
     def fit(self, role: str, size: ObjectSize) -> LensFit:
         """Return how `camera` or `projector` suits an object, see `LensFit`."""
-        projects = role == "projector"
-        table = self._projector_table if projects else self.table.camera
-        device = self._projector if projects else self._camera
+        table, device = self.table.camera, self._camera
+        if role == "projector":
+            table, device = self._projector_table, self._projector
         stands = self.standoff_m, self.standoff_play_m
         return LensFit(role, table, device, *stands, size)
 
     def fits(self, mesh: TriangleMesh) -> tuple[LensFit, ...]:
         """Return how camera and projector suit an object."""
-        size = ObjectSize.of(mesh)
-        return tuple(self.fit(role, size) for role in ("camera", "projector"))
+        return tuple(self.fit(r, ObjectSize.of(mesh)) for r in ("camera", "projector"))
 
     def outer_ring_radius(self) -> float:
         """Return the outermost ring, wherever the ring axis is turned or shifted to."""
         return light_of(self._projector).image_ring(self.ring_offset)
 
     def notes(self) -> tuple[str, ...]:
-        """Return what a user should know of these limits, a sentence each."""
-        return limit_notes(self.table.limits)
+        """Return what a user should know of limits and devices, a sentence each."""
+        lit = device_notes(self.projector_key, self._projector_table)
+        seen = device_notes("camera", self.table.camera)
+        return (*limit_notes(self.table.limits), *lit, *seen)
 
     def requirements(
         self,
@@ -291,11 +293,11 @@ class Rig:
     @property
     def _projector_table(self) -> PinholeTable | ParallelTable:
         """The projector of this light as written."""
-        table = getattr(self.table, self.projector_key)
+        key = self.projector_key
+        table = getattr(self.table, key)
         if table is None:
             raise RigError(
-                f"rig {self.name}: light '{self.light}' needs a table "
-                f"[{self.projector_key}]; "
+                f"rig {self.name}: light '{self.light}' needs a table [{key}]; "
                 f'add it, or lay the file over one that has it: base = "default"'
             )
         return table
@@ -304,12 +306,13 @@ class Rig:
 def _check_devices(rig: Rig) -> None:
     """Refuse a rig whose devices can't be sharp at the standoff."""
     devices = {"projector": rig.projector_device(), "camera": rig.camera_device()}
-    for role, device in devices.items():
-        low, high = device.range_m
-        if not low <= rig.standoff_m <= high:
-            raise InfeasibleLimitsError(
-                f"rig {rig.name}: {unsharp(rig.fit(role, ObjectSize.ball(0.0)))}"
-            )
+    blurred = [
+        f"rig {rig.name}: {unsharp(rig.fit(role, ObjectSize.ball(0.0)))}"
+        for role, device in devices.items()
+        if not device.range_m[0] <= rig.standoff_m <= device.range_m[1]
+    ]
+    if blurred:
+        raise InfeasibleLimitsError("\n".join(blurred))
     if not math.isfinite(rig.outer_ring_radius()):
         raise RigError(
             f"rig {rig.name}: rings.tilt_deg = {rig.table.rings.tilt_deg:g} turns the "

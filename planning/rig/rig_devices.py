@@ -1,6 +1,7 @@
 """Devices of a rig file, turned into optical models in pixels and metres."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import asdict, replace
 from typing import Any, cast
 
@@ -181,13 +182,35 @@ def device_document(
         **device.to_document(),
         "figures": table.model_dump(
             mode="json",
-            exclude={"name", "sources"},
+            exclude={"name", "device", "sources"},
             exclude_none=True,
             exclude_unset=True,
         ),
         "sources": {key: table.sources.get(key, _UNSAID) for key in table.figures()},
         **({} if body is None else {"body": asdict(body)}),
     }
+
+
+def device_notes(role: str, table: PinholeTable | ParallelTable) -> Iterator[str]:
+    """Yield what a user of a device of the catalogue should know, a sentence each."""
+    if table.device is None:
+        return
+    # How it is focused is the user's own choice.
+    guessed = [
+        key
+        for key in table.figures()
+        if table.sources.get(key, "").startswith("assumed") and "focus" not in key
+    ]
+    if guessed:
+        yield (
+            f"{role} {table.device}: {', '.join(guessed)} assumed, not read; check "
+            f"your data sheet"
+        )
+    if isinstance(table, PinholeTable) and table.focus is None:
+        yield (
+            f"{role} {table.device}: without [{role}.focus] every distance from "
+            f"{(table.range_mm or [0.0])[0]:g} mm on counts as sharp"
+        )
 
 
 def _focal_px(table: PinholeTable) -> tuple[float, float]:

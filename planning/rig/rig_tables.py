@@ -54,9 +54,10 @@ class FocusTable(Table):
 
 
 class DeviceTable(SourcedTable):
-    """A device, perhaps with body and mount."""
+    """A device, perhaps of the catalogue, with body and mount."""
 
     name: Name
+    device: Name | None = None
     body: BodyTable | None = None
     mount: MountTable | None = None
 

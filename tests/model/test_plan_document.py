@@ -1,4 +1,4 @@
-"""The typed plan: schema, what a file keeps, and faults of a file in one line."""
+"""The typed plan: schema, what a file keeps, and faults of a file, a line each."""
 
 import contextlib
 import hashlib
@@ -86,7 +86,7 @@ def test_parts_are_frozen_and_changes_are_validated(plan):
         (lambda d: d["certificates"].clear(), "certificates.cameras is missing"),
     ],
 )
-def test_a_broken_plan_is_refused_in_one_line(
+def test_a_broken_plan_is_refused_a_line_for_each_fault(
     plan, handmade, tmp_path, change, sentence
 ):
     path = handmade.save(plan, tmp_path)
@@ -97,9 +97,9 @@ def test_a_broken_plan_is_refused_in_one_line(
         RigPlan.load(path)
     message = str(caught.value)
     assert sentence in message
-    assert message.startswith(f"{path}: ")
-    assert message.endswith("; plan again")
-    assert "\n" not in message
+    for line in message.splitlines():
+        assert line.startswith(f"{path}: ")
+        assert line.endswith("; plan again")
     result = CliRunner().invoke(commands, ["verify", str(path)])
     assert result.exit_code == 3
 

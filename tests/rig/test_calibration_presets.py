@@ -7,7 +7,7 @@ import pytest
 from planning import load_rig
 from planning.model.calibration_errors import CalibrationErrors
 from planning.model.errors import RigError
-from planning.rig.rig_files import list_calibrations
+from planning.rig.toml.preset_lists import list_calibrations
 
 # Read in the report and the issue that the sources name, and in ISO 2768-1.
 SIGMA0_PX, DOTS_PX = 0.178095, 7.4693 * 313.241

@@ -2,7 +2,7 @@
 
 import pytest
 
-from planning.cli.other_commands import rigs_command
+from planning.cli.devices.rigs_command import show_rig_command
 from planning.model.errors import RigError
 from planning.rig.rig import load_rig
 from planning.rig.rig_devices import light_budget
@@ -63,7 +63,7 @@ def test_noise_may_be_the_lights_alone(budget):
 
 
 def test_presets_of_sensors_are_listed_with_their_sources(capsys):
-    assert rigs_command(None) == 0
+    assert show_rig_command("imx250", sources=True) == 0
     text = capsys.readouterr().out
     assert "full_well_e = 10700.0" in text
     assert "SNRmax 40.3 dB" in text

@@ -21,8 +21,11 @@ from planning.experiments.paper_devices import (
 from planning.experiments.setups import FACE_RADII_M
 from planning.model.errors import InfeasibleLimitsError, InputError, RigError
 from planning.rig.rig import load_rig
-from planning.rig.rig_files import lay_over, list_presets, preset_names, read_rig
 from planning.rig.rig_tables import RigTable
+from planning.rig.toml.laying import lay_over
+from planning.rig.toml.preset_files import preset_names
+from planning.rig.toml.preset_lists import list_presets
+from planning.rig.toml.rig_files import read_rig
 from planning.rig.wishes import Wishes
 
 MINIMAL = """

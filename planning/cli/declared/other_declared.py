@@ -1,4 +1,4 @@
-"""`plan verify`, `accept`, `show`, `rigs`, `schema` and `sample`: their options."""
+"""`plan verify`, `accept`, `show` and `sample`: their options."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +15,6 @@ from planning.cli.console import (
 )
 
 from .export_declared import check_rendering, rendering_options
-from .plan_declared import rig_command
 
 # Of `plan show`, as `planning.report.summary.sections` has them, which takes longer to
 # import than `plan show --help` may.
@@ -31,8 +30,6 @@ _SECTIONS = {
     "cost": "How long a scan takes; eq. (8).",
     "all": "All of these.",
 }
-# What says which object and which rig there are.
-_OF_OBJECTS = ("meshes", "files", "unit", "size_mm", "rig_name", "light")
 
 
 @click.command()
@@ -109,53 +106,6 @@ def show(**options: Any) -> None:  # noqa: ANN401
     from planning.cli.show_command import show_command
 
     run(lambda: show_command(options), debug=options["debug"])
-
-
-@click.command(
-    params=[p for p in rig_command.params if p.name in _OF_OBJECTS],
-)
-@debug_option
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
-def lens(**options: Any) -> None:  # noqa: ANN401
-    """Say which lens, throw, f-number and focus suit an object, without planning."""
-    from planning.cli.lens_command import lens_command
-
-    meshes = (*options.pop("meshes"), *options.pop("files"))
-    if len(meshes) != 1 or not meshes[0]:
-        raise click.UsageError(f"give --mesh FILE, one; {len(meshes)} were given")
-    if options["unit"] and options["size_mm"] is not None:
-        raise click.UsageError("give --unit or --size-mm, not both")
-    run(lambda: lens_command(options | {"mesh": meshes[0]}), debug=options["debug"])
-
-
-@click.command()
-@click.argument("action", type=click.Choice(["show", "new"]), required=False)
-@click.argument("name", required=False)
-@debug_option
-def rigs(action: str | None, name: str | None, debug: bool) -> None:
-    """List the rigs that need no file, with the source of every number.
-
-    `plan rigs show NAME` prints one as the file that it is: to read, or to change.
-    """
-    from planning.cli.other_commands import rigs_command
-
-    if action == "new":
-        raise click.UsageError(
-            "`plan rigs new` isn't built yet; change what `plan rigs show default` "
-            "prints"
-        )
-    if (action is None) != (name is None):
-        raise click.UsageError("`plan rigs show` needs the NAME of a rig")
-    run(lambda: rigs_command(name), debug=debug)
-
-
-@click.command()
-@debug_option
-def schema(debug: bool) -> None:
-    """Print the JSON Schema of plan.json."""
-    from planning.cli.other_commands import schema_command
-
-    run(schema_command, debug=debug)
 
 
 @click.command()

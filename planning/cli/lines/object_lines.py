@@ -13,8 +13,11 @@ def size_lines(mesh: TriangleMesh) -> Iterator[str]:
     source = mesh.source
     if source is not None:
         x, y, z = (mesh.bounds[1] - mesh.bounds[0]) * 1e3
+        scale = f"unit {source.unit}"
+        if source.unit == "size_mm":
+            scale = "scaled by --size-mm"
         yield (
-            f"{source.path}: {x:.1f} x {y:.1f} x {z:.1f} mm (unit {source.unit}), "
+            f"{source.path}: {x:.1f} x {y:.1f} x {z:.1f} mm ({scale}), "
             f"{len(mesh.faces)} faces"
         )
         for repair in source.repairs:
@@ -24,5 +27,6 @@ def size_lines(mesh: TriangleMesh) -> Iterator[str]:
 
 
 def optics_lines(rig: Rig, mesh: TriangleMesh) -> list[str]:
-    """Return a line for each device whose optics leave most of its image unused."""
-    return [f"  {note}" for note in optics_notes(rig.fits(mesh))]
+    """Return lines on devices: what to know of them, and what they leave unused."""
+    notes = (*rig.notes(), *optics_notes(rig.fits(mesh)))
+    return [f"  {note}" for note in notes]

@@ -1,0 +1,1 @@
+"""What is measured of rig files: presets, and files that were damaged."""

@@ -1,0 +1,1 @@
+"""Commands about devices: which there are, which suit, and what they show."""

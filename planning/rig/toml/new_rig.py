@@ -1,0 +1,280 @@
+"""A rig file from a few answers: what isn't answered is chosen, and said."""
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from planning.rig import optics
+from planning.rig.rig_devices import pinhole_device
+from planning.rig.rig_tables import CameraTable, PinholeTable, ProjectorTable
+
+from .catalogue import FARTHEST_MM, LensEntry, device_table, split_camera
+
+# Radius of the ball about an object over its longest side: more than half of it.
+_BALL = 0.6
+_FOCAL_MM = (100.0, 75.0, 50.0, 35.0, 25.0, 16.0, 12.0, 8.0, 6.0, 4.0)
+_STOPS = (2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 22.0)
+# Closed further, diffraction blurs more than the depth of field wins.
+_CLOSED = 11.0
+_MOST_BLUR_PX = 12
+_PROJECTOR_STOP, _PROJECTOR_BLUR_PX = 2.0, 5.0
+_PLAY = 0.05
+# Position that a dot sheet leaves at 1 m. Its angle, 0.0075 degrees, moves points by
+# 1.3e-4 of the distance; two and a half times that is what many rigs can keep.
+_SHEET_MM, _SIGMA_MM, _SIGMA_SHARE = 0.04, 0.3, 2.5 * 1.3e-4
+_STATED = "stated to `plan rigs new`"
+_FITS = "assumed: so that the object's depth is sharp"
+
+
+@dataclass
+class Answers:
+    """What a user knows; None: choose. Lengths in mm, sizes in pixels."""
+
+    object_mm: float
+    projector: str | None = None
+    throw_ratio: float | None = None
+    projector_px: tuple[int, int] = (1920, 1080)
+    offset_percent: float = 0.0
+    camera: str | None = None
+    sensor_px: tuple[int, int] | None = None
+    pixel_um: float = 3.45
+    focal_mm: float | None = None
+    distance_mm: float | None = None
+    name: str = "my rig"
+
+
+@dataclass
+class _Device:
+    """A device table as it will be written, and what it stands for."""
+
+    written: dict[str, Any]
+    table: dict[str, Any]
+    stops: Sequence[float] = (_STOPS[0], _STOPS[-1])
+    sources: dict[str, str] = field(default_factory=dict[str, str])
+
+    def model(self, kind: type[PinholeTable]) -> Any:  # noqa: ANN401
+        return pinhole_device(kind.model_validate(self.table), "device")
+
+
+def new_rig(answers: Answers) -> tuple[str, list[str]]:
+    """Return the text of a rig file, and what was chosen for the user, a line each.
+
+    Raises:
+        ValueError: If a device isn't known, or no lens shows the object.
+        RigError: If a device can't be.
+    """
+    chosen: list[str] = []
+    radius = _BALL * answers.object_mm
+    projector = _projector(answers)
+    beam = projector.model(ProjectorTable)
+    distance = answers.distance_mm
+    if distance is None:
+        near = max(beam.range_m[0] * 1e3, 0.0) / (1.0 - _PLAY)
+        distance = _rounded(max(radius / math.sin(beam.half_angle) - radius, near))
+        if answers.camera and "+" in answers.camera:
+            view = _camera(answers, distance, chosen).model(CameraTable)
+            holds = radius / math.sin(view.half_angle) - radius
+            distance = max(distance, _rounded(max(holds, view.range_m[0] * 1e3)))
+        chosen.append(
+            f"distance {distance:g} mm from device to surface: the least from which "
+            f"one image holds the object (--distance-mm)"
+        )
+    camera = _camera(answers, distance, chosen)
+    near, far = distance * (1.0 - _PLAY), distance * (1.0 + _PLAY) + radius
+    _focus_projector(projector, near, far, chosen)
+    _focus_camera(camera, near, far, chosen)
+    return _text(answers, distance, projector, camera, chosen), chosen
+
+
+def _projector(answers: Answers) -> _Device:
+    if answers.throw_ratio is None:
+        name = answers.projector or ""
+        return _Device({"device": name}, device_table("projector", name, {}))
+    written = {
+        "name": f"a projector of throw ratio {answers.throw_ratio:g}",
+        "resolution_px": [*answers.projector_px],
+        "throw_ratio": answers.throw_ratio,
+        "vertical_offset_percent": answers.offset_percent,
+        "range_mm": [100.0, FARTHEST_MM],
+    }
+    sources = dict.fromkeys((*written,)[1:4], _STATED)
+    sources["range_mm"] = "assumed: its focus reaches wherever it stands; check"
+    return _Device(written, dict(written), sources=sources)
+
+
+def _camera(answers: Answers, distance: float, chosen: list[str]) -> _Device:
+    if answers.sensor_px is None:
+        camera, lens = split_camera(answers.camera or "")
+        device = answers.camera or ""
+        if lens is None:
+            focal = answers.focal_mm or _fitting_mm(
+                camera.resolution_px, camera.pixel_um, answers, distance, chosen
+            )
+            device = f"{device.strip()} + {focal:g}mm"
+        stops = lens.f_numbers if isinstance(lens, LensEntry) else _STOPS
+        table = device_table("camera", device, {})
+        return _Device({"device": device}, table, (stops[0], stops[-1]))
+    size = [*answers.sensor_px]
+    focal = answers.focal_mm or _fitting_mm(
+        size, answers.pixel_um, answers, distance, chosen
+    )
+    written = {
+        "name": f"a camera of {size[0]} x {size[1]} px with a {focal:g} mm lens",
+        "resolution_px": size,
+        "pixel_um": answers.pixel_um,
+        "focal_mm": focal,
+        "range_mm": [10.0 * focal, FARTHEST_MM],
+    }
+    sources = dict.fromkeys((*written,)[1:4], _STATED)
+    sources["range_mm"] = "assumed: from ten focal lengths on"
+    return _Device(written, dict(written), sources=sources)
+
+
+def _fitting_mm(
+    size: Sequence[int],
+    pixel_um: float,
+    answers: Answers,
+    distance: float,
+    chosen: list[str],
+) -> float:
+    """The longest usual lens whose image holds the object at this distance [mm]."""
+    radius = _BALL * answers.object_mm
+    half = 0.5e-3 * pixel_um * min(size)
+    for focal in _FOCAL_MM:
+        if math.sin(math.atan(half / focal)) * (distance + radius) >= radius:
+            chosen.append(
+                f"a {focal:g} mm lens: the longest usual one whose image holds the "
+                f"object (--focal-mm)"
+            )
+            return focal
+    raise ValueError(
+        f"no usual lens shows {answers.object_mm:g} mm from {distance:g} mm away with "
+        f"a sensor {2.0 * half:.2g} mm high; write a larger --distance-mm, or "
+        f"--focal-mm for images side by side"
+    )
+
+
+def _focus_projector(
+    device: _Device, near: float, far: float, chosen: list[str]
+) -> None:
+    pixel_um = device.table.get("pixel_um")
+    if pixel_um is None:
+        chosen.append("of the projector no depth of field: its panel isn't known")
+        return
+    focal = device.model(ProjectorTable).focal_px * pixel_um * 1e-3
+    need, distance = _stop(focal, _PROJECTOR_BLUR_PX * pixel_um, near, far)
+    blur = max(1.0, math.ceil(1.1 * need / _PROJECTOR_STOP))
+    _write_focus(device, distance, _PROJECTOR_STOP, _PROJECTOR_BLUR_PX * blur)
+    chosen.append(
+        f"the projector at f/{_PROJECTOR_STOP:g}, focused at {distance:.0f} mm, with "
+        f"edges blurred by up to {_PROJECTOR_BLUR_PX * blur:g} px"
+    )
+
+
+def _focus_camera(device: _Device, near: float, far: float, chosen: list[str]) -> None:
+    pixel_um, focal = device.table["pixel_um"], device.table["focal_mm"]
+    most = min(_CLOSED, device.stops[1])
+    need, distance = _stop(focal, pixel_um, near, far)
+    # What a stop must be falls as the blur that is let pass.
+    blur = min(max(1, math.ceil(1.05 * need / most)), _MOST_BLUR_PX)
+    need /= blur
+    stop = next((s for s in _STOPS if s >= 1.05 * need and s >= device.stops[0]), most)
+    _write_focus(device, distance, stop, float(blur))
+    chosen.append(
+        f"the cameras at f/{stop:g}, focused at {distance:.0f} mm, with up to {blur} "
+        f"px of blur at the ends of the object's depth"
+    )
+
+
+def _stop(focal: float, blur_um: float, near: float, far: float) -> tuple[float, float]:
+    stop, distance = optics.least_stop(
+        1e-3 * focal, 1e-6 * blur_um, 1e-3 * near, 1e-3 * far
+    )
+    return stop, 1e3 * distance
+
+
+def _write_focus(device: _Device, distance: float, stop: float, blur: float) -> None:
+    device.written["focus"] = {
+        "distance_mm": float(f"{distance:.0f}"),
+        "f_number": stop,
+        "blur_px": blur,
+    }
+    device.sources |= {f"focus.{key}": _FITS for key in device.written["focus"]}
+
+
+def _rounded(mm: float) -> float:
+    step = 10.0 if mm < 1000.0 else 50.0
+    return step * math.ceil(mm / step - 1e-9)
+
+
+def _text(
+    answers: Answers,
+    distance: float,
+    projector: _Device,
+    camera: _Device,
+    chosen: list[str],
+) -> str:
+    sheet = float(f"{_SHEET_MM * min(1.0, distance / 1e3):.2g}")
+    lines = [
+        "# Written by `plan rigs new`; every key: docs/reference/rig-files.md.",
+        "# For completion: plan schema --of rig > rig.schema.json, and on top, as a",
+        "# line of its own: #:schema ./rig.schema.json",
+        "",
+        f"name = {json.dumps(answers.name)}",
+        f'description = "for objects up to {answers.object_mm:g} mm"',
+        "",
+        "# A name of `plan rigs devices`, or figures of your own.",
+        *_table("projector", projector),
+        '# K and distortion as measured by OpenCV: calibration = "camera.yml"',
+        *_table("camera", camera),
+        "# From device to surface. Rooms, floors and mounting planes: [workspace];",
+        "# without it devices may stand anywhere about the object.",
+        "[placement]",
+        f"standoff_mm = {distance:.1f}",
+        f"standoff_play_mm = {float(f'{_PLAY * distance:.3g}')}",
+        "",
+        "# What your calibration will leave; position in proportion to the distance.",
+        "[calibration]",
+        'from = "dot-sheet"',
+        f"position_mm = {sheet}",
+        "",
+        "[calibration.sources]",
+        'position_mm = "assumed: that of the dot sheet at 1 m, in proportion"',
+        "",
+    ]
+    sigma = math.ceil(10.0 * _SIGMA_SHARE * distance) / 10.0
+    if sigma > _SIGMA_MM + 0.1:
+        lines += [
+            "# From so far away a calibration leaves more.",
+            "[limits]",
+            f"max_sigma_mm = {sigma}",
+            "",
+            "[check]",
+            f"max_rms_mm = {sigma / 2:.2g}",
+            f"max_p95_mm = {sigma * 1.5:.2g}",
+            f"max_bias_mm = {sigma / 8:.2g}",
+            "",
+        ]
+        chosen.append(f"sigma up to {sigma:g} mm, from so far away")
+    return "\n".join(lines)
+
+
+def _table(name: str, device: _Device) -> list[str]:
+    lines = [f"[{name}]"]
+    tables = {}
+    for key, value in device.written.items():
+        if isinstance(value, dict):
+            tables[key] = value
+        else:
+            lines.append(f"{key} = {json.dumps(value)}")
+    if device.sources:
+        tables["sources"] = {
+            f'"{key}"' if "." in key else key: value
+            for key, value in device.sources.items()
+        }
+    for key, table in tables.items():
+        lines += ["", f"[{name}.{key}]"]
+        lines += [f"{inner} = {json.dumps(value)}" for inner, value in table.items()]
+    return [*lines, ""]

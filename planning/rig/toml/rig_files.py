@@ -1,0 +1,110 @@
+"""Rig files and presets: found, read, laid over their base, checked.
+
+Every fault becomes one line that says where it stands, what was written, the rule and
+what to do.
+"""
+
+import difflib
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from geometry.files.file_content import file_content
+from planning.model.errors import RigError
+from planning.model.files import reading
+from planning.model.table_types import fault_words
+from planning.rig.rig_tables import RigTable
+
+from .named import WHOLE_FILE, Named
+from .preset_files import preset_names, preset_text
+
+
+def read_rig(name_or_path: str | Path) -> RigTable:
+    """Read and check a preset, or a file: text with `.toml` or a separator is a path.
+
+    Raises:
+        RigError: One line for each fault.
+    """
+    if _is_path(name_or_path):
+        where, tables = str(name_or_path), _read_file(Path(name_or_path))
+    else:
+        name = str(name_or_path)
+        if name not in preset_names() and Path(f"{name}.toml").is_file():
+            raise RigError(
+                f"rig {name}: no such preset; did you mean the file {name}.toml?"
+            )
+        where, tables = f"rig {name}", tomllib.loads(preset_text(name))
+    named = Named(rig_folder(name_or_path))
+    tables, table = named.resolved(tables), None
+    faults = named.faults
+    try:
+        table = RigTable.model_validate(tables)
+    except ValidationError as error:
+        entries = error.errors(include_url=False)
+        faults += [_fault(e) for e in entries if not _follows(e, named.broken)]
+    if table is None or faults:
+        raise RigError("\n".join(f"{where}: {fault}" for fault in faults))
+    return table
+
+
+def _follows(entry: ErrorDetails, broken: set[str]) -> bool:
+    """Whether a fault is there only because a named thing wasn't found."""
+    if entry["type"] == "missing" and WHOLE_FILE in broken:
+        return True
+    return bool(entry["loc"]) and entry["loc"][0] in broken
+
+
+def rig_folder(name_or_path: str | Path) -> Path:
+    """Return where files that a rig names are looked for: beside its own."""
+    return Path(name_or_path).parent if _is_path(name_or_path) else Path()
+
+
+def _is_path(name: str | Path) -> bool:
+    text = str(name)
+    named = text.lower().endswith(".toml") or "/" in text or "\\" in text
+    return named or isinstance(name, Path)
+
+
+def _read_file(path: Path) -> dict[str, Any]:
+    presets = f"; give a rig file or a preset ({', '.join(preset_names())})"
+    with reading(path, RigError, absent=presets):
+        content = file_content(path)
+    try:
+        return tomllib.loads(content.decode())
+    except ValueError as error:
+        raise RigError(f"{path}: not TOML ({error}); correct that line") from None
+
+
+def _fault(entry: ErrorDetails) -> str:
+    unknown = _nearest_key(entry["loc"]) if entry["type"] == "extra_forbidden" else ""
+    remedy = "write such a value, or remove the key"
+    return fault_words(entry, unknown=unknown, remedy=remedy)
+
+
+def _nearest_key(loc: tuple[int | str, ...]) -> str:
+    """Say in which table a key belongs, or which of the same may have been meant."""
+    # A number is a place in a list of tables.
+    table = ".".join(part for part in loc[:-1] if isinstance(part, str))
+    tables, key = dict(_tables("", RigTable)), str(loc[-1])
+    homes = [name for name, known in tables.items() if key in known]
+    if "" in homes:
+        return "it belongs above the first table"
+    if homes:
+        return f"it belongs in [{'] or ['.join(homes)}]"
+    known = tables[table]
+    close = difflib.get_close_matches(key, known, n=1)
+    return f"did you mean {close[0]}?" if close else f"keys here: {', '.join(known)}"
+
+
+def _tables(name: str, model: type[BaseModel]) -> Iterator[tuple[str, list[str]]]:
+    """Yield the keys of a table by its name, and of all tables within it."""
+    yield name, list(model.model_fields)
+    for key, field in model.model_fields.items():
+        # A field holds a table bare, beside None or in a list.
+        for kind in getattr(field.annotation, "__args__", (field.annotation,)):
+            if isinstance(kind, type) and issubclass(kind, BaseModel):
+                yield from _tables(f"{name}.{key}".removeprefix("."), kind)
