@@ -57,22 +57,16 @@ def drawn_by(
     )
 
 
-def write_patterns(scanner: Scanner, folder: Path) -> Path:
-    """Write `patterns/` into a plan's folder: PNG images and `sequence.json`.
-
-    Returns the folder of the patterns.
-
-    Raises:
-        OSError: If it can't be written.
-    """
-    place = folder / FOLDER
-    files: dict[Path, Callable[[BinaryIO], object]] = {}
+def pattern_contents(
+    scanner: Scanner,
+) -> dict[str, Callable[[BinaryIO], object]]:
+    """Return what writes each file of `patterns/`: PNG images, then `sequence.json`."""
+    files: dict[str, Callable[[BinaryIO], object]] = {}
     entries: list[dict[str, Any]] = []
     for p, projector in enumerate(scanner.projectors):
         frames, drawn = scanner.frames(p), drawn_by(projector, scanner.cameras)
-        (place / projector.id).mkdir(parents=True, exist_ok=True)
         for frame in frames:
-            path = place / projector.id / f"{frame.name}.png"
+            path = f"{projector.id}/{frame.name}.png"
             files[path] = _png_writer(partial(drawn, frame))
         entries.append(
             {
@@ -95,7 +89,22 @@ def write_patterns(scanner: Scanner, folder: Path) -> Path:
         "projectors": entries,
     }
     text = json.dumps(manifest, indent=1, allow_nan=False) + "\n"
-    files[place / _MANIFEST] = lambda file: file.write(text.encode())
+    files[_MANIFEST] = lambda file: file.write(text.encode())
+    return files
+
+
+def write_patterns(scanner: Scanner, folder: Path) -> Path:
+    """Write `patterns/` into a plan's folder.
+
+    Returns the folder of the patterns.
+
+    Raises:
+        OSError: If it can't be written.
+    """
+    place = folder / FOLDER
+    files = {place / name: write for name, write in pattern_contents(scanner).items()}
+    for path in files:
+        path.parent.mkdir(parents=True, exist_ok=True)
     write_together(files)
     return place
 
