@@ -93,7 +93,7 @@ def commands() -> None:
     plan lens --mesh face.obj                 which lens and focus suit an object
     plan calibrate face-plan/plan.json        images of a board that calibrate the rig
     plan reconstruct face-plan/plan.json      a cloud from rendered or captured images
-    plan export face-plan --to ros,csv        for ROS, COLMAP, Blender, CAD, a builder ...
+    plan export face-plan --to ros,csv        for ROS, COLMAP, Blender, CAD, builders
 
     Exit: 0 planned and checked, 1 a requirement is missed, 2 usage, 3 bad input,
     4 nothing can be served, 5 time limit, 130 interrupted.

@@ -72,7 +72,8 @@ def build(rig, device):
     if device["body"]:
         solid(rig, device["id"] + "_body", device["body"], device["body_faces"], pose)
     if device["world_from_mount"]:
-        mount = placed(rig, device["id"] + "_mount", None, Matrix(device["world_from_mount"]))
+        mount = Matrix(device["world_from_mount"])
+        mount = placed(rig, device["id"] + "_mount", None, mount)
         mount.empty_display_type, mount.empty_display_size = "ARROWS", 0.05
 
 
@@ -148,11 +149,12 @@ class BlenderScript:
     name = "blender"
     what = "Blender script"
     notes = (
-        "blender --python build_rig.py: a scene a device with its camera, resolution and",
-        "pixel aspect; spot lights that project patterns/ID/*.png (change `pattern` in",
-        "the script for another frame); housings, mounts, object and obstacles from",
-        f"{_MESHES}. Metres; cameras and lights look along their -z with +y up. Blender",
-        "keeps places, lenses and turns in single precision.",
+        "blender --python build_rig.py: a scene a device with its camera, "
+        "resolution and pixel aspect; spot lights that project patterns/ID/*.png "
+        "(change `pattern` in the script for another frame); housings, mounts, "
+        "object and obstacles from meshes.npz. Metres; cameras and lights look "
+        "along their -z with +y up. Blender keeps places, lenses and turns in "
+        "single precision."
     )
 
     def lacks(self, rig: ExportedRig) -> list[str]:
@@ -165,8 +167,8 @@ class BlenderScript:
             )
         if rig.parallel:
             sentences.append(
-                f"{id_words(rig.parallel)}: the pattern is left out, Blender's parallel "
-                f"light shows no image"
+                f"{id_words(rig.parallel)}: its pattern is left out, Blender's "
+                f"parallel light shows no image"
             )
         return sentences
 

@@ -1,4 +1,4 @@
-"""COLMAP from 3.12 on: a sparse model with one rig and one frame, as text and binary."""
+"""COLMAP from 3.12 on: a model with one rig and one frame, as text and binary."""
 
 import struct
 
@@ -26,28 +26,28 @@ class ColmapModel:
     name = "colmap"
     what = "COLMAP sparse model"
     notes = (
-        "text/ and binary/ hold the same: cameras, rigs, frames, images (ID.png), no",
-        "points. Metres; camera axes x right, y down, z ahead; the centre of the top-left",
-        "pixel is (0.5, 0.5), half a pixel on from the plan's. Every device is a sensor",
-        "of one rig, the first is its reference; a projector is a camera too. The model",
-        "is PINHOLE, or FULL_OPENCV where the lens distorts (k1 k2 p1 p2 k3 0 0 0).",
-        "Housings, mounts and the object have no place in it.",
+        "text/ and binary/ hold the same: cameras, rigs, frames, images (ID.png), "
+        "no points. Metres; camera axes x right, y down, z ahead; the centre of the "
+        "top-left pixel is (0.5, 0.5), half a pixel on from the plan's. Every "
+        "device is a sensor of one rig, the first is its reference; a projector is "
+        "a camera too. The model is PINHOLE, or FULL_OPENCV where the lens distorts "
+        "(k1 k2 p1 p2 k3 0 0 0). Housings, mounts and the object have no place in "
+        "it."
     )
 
     def lacks(self, rig: ExportedRig) -> list[str]:
         """Return a sentence if there is parallel light."""
         if not rig.parallel:
             return []
-        return [
-            f"{id_words(rig.parallel)}: left out, COLMAP has no camera of parallel light"
-        ]
+        return [f"{id_words(rig.parallel)}: left out, COLMAP has no parallel light"]
 
     def files(self, rig: ExportedRig) -> dict[str, Content]:
         """Return both models."""
         devices = [device for device in rig.devices if device.lens is not None]
         text, binary = _text(devices), _binary(devices)
-        return {f"text/{name}.txt": part.encode() for name, part in text.items()} | {
-            f"binary/{name}.bin": part for name, part in binary.items()
+        return {
+            **{f"text/{name}.txt": part.encode() for name, part in text.items()},
+            **{f"binary/{name}.bin": part for name, part in binary.items()},
         }
 
 
@@ -96,7 +96,10 @@ def _text(devices: list[ExportedDevice]) -> dict[str, str]:
     parts = {
         "cameras": ("CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]", cameras),
         "rigs": ("RIG_ID, NUM_SENSORS, REF_SENSOR, SENSORS[]", rigs),
-        "frames": ("FRAME_ID, RIG_ID, RIG_FROM_WORLD, NUM_DATA_IDS, DATA_IDS[]", frames),
+        "frames": (
+            "FRAME_ID, RIG_ID, RIG_FROM_WORLD, NUM_DATA_IDS, DATA_IDS[]",
+            frames,
+        ),
         "images": ("IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME", images),
         "points3D": ("POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[]", []),
     }

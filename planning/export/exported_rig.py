@@ -15,8 +15,8 @@ from geometry.shapes.boxes import OrientedBox
 from planning.model.bodies import Body
 from planning.model.device_poses import moved_to
 from planning.model.plan import RigPlan
-from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.scene.placed_bodies import kind_of, placed_box
+from planning.model.planned import PlannedCamera
+from planning.scene.placed_bodies import Device, kind_of, placed_box
 
 from .export_frames import ExportFrame
 
@@ -46,7 +46,7 @@ class ExportedDevice:
         reach_m: Distance to the object's centre [m].
     """
 
-    planned: PlannedProjector | PlannedCamera
+    planned: Device
     kind: str
     world_from_mount: Array | None
     reach_m: float
@@ -189,7 +189,7 @@ class ExportedRig:
         records = (*plan.document.projectors, *plan.document.cameras)
         devices = [
             ExportedDevice(
-                moved_to(device, move @ device.world_from_device),
+                _moved_device(device, move),
                 kind_of(device),
                 None
                 if record.world_from_mount is None
@@ -222,9 +222,7 @@ class ExportedRig:
     def shifted(self) -> list[ExportedDevice]:
         """Devices with lens shift: whose principal point isn't the image's middle."""
         return [
-            each
-            for each in self.devices
-            if np.abs(each.lens_shift).max() > _CENTRED_PX
+            each for each in self.devices if np.abs(each.lens_shift).max() > _CENTRED_PX
         ]
 
     @property
@@ -238,13 +236,13 @@ class ExportFormat(Protocol):
 
     Attributes:
         name: As `--to` has it.
-        what: Kind of files, for lines and README.txt.
-        notes: Lines of README.txt: axes, unit, what is where.
+        what: Kind of files, as README.txt has it.
+        notes: For README.txt: axes, unit, what is where.
     """
 
     name: str
     what: str
-    notes: tuple[str, ...]
+    notes: str
 
     def lacks(self, rig: ExportedRig) -> list[str]:
         """Return a sentence for each thing of this rig that the format can't hold."""
@@ -264,6 +262,13 @@ def numbers(values: Sequence[float] | Array, between: str = ", ") -> str:
     """Return numbers with all their digits."""
     flat = np.asarray(values, dtype=np.float64).ravel() + 0.0
     return between.join(repr(float(value)) for value in flat)
+
+
+def _moved_device(device: Device, motion: Array) -> Device:
+    pose = motion @ device.world_from_device
+    if isinstance(device, PlannedCamera):
+        return moved_to(device, pose)
+    return moved_to(device, pose)
 
 
 def _moved(mesh: TriangleMesh, motion: Array) -> TriangleMesh:

@@ -38,12 +38,12 @@ class GlbScene:
     name = "gltf"
     what = "glTF 2.0, binary"
     notes = (
-        "rig.glb: nodes `object`, the obstacles, and one a device with its camera; below",
-        "it ID_body, ID_frustum and ID_mount. Metres; a node looks along its -z with +y",
-        "up; coordinates are those of the frame above, whose up axis need not be y.",
-        "A node's `extras` have K, resolution, distortion and pose in OpenCV's axes. The",
-        "camera itself has the field of view about the optical axis alone. Vertices are",
-        "single precision.",
+        "rig.glb: nodes `object`, the obstacles, and one a device with its camera; "
+        "below it ID_body, ID_frustum and ID_mount. Metres; a node looks along its "
+        "-z with +y up; coordinates are those of the frame above, whose up axis "
+        "need not be y. A node's `extras` have K, resolution, distortion and pose "
+        "in OpenCV's axes. The camera itself has the field of view about the "
+        "optical axis alone. Vertices are single precision."
     )
 
     def lacks(self, rig: ExportedRig) -> list[str]:

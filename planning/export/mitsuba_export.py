@@ -15,10 +15,18 @@ NAME = "mitsuba"
 
 
 def mitsuba_lacks(rig: ExportedRig) -> list[str]:
-    """Return a sentence for distortion."""
-    if not rig.distorted:
-        return []
-    return [f"{id_words(rig.distorted)}: without distortion, Mitsuba has no such lens"]
+    """Return a sentence for distortion, and one for parallel light."""
+    sentences: list[str] = []
+    if rig.distorted:
+        sentences.append(
+            f"{id_words(rig.distorted)}: without distortion, Mitsuba has no such lens"
+        )
+    if rig.parallel:
+        sentences.append(
+            f"{id_words(rig.parallel)}: parallel light comes from a pinhole 100 km "
+            f"away, which Mitsuba's single precision puts millimetres aside"
+        )
+    return sentences
 
 
 def write_mitsuba(
@@ -37,7 +45,9 @@ def write_mitsuba(
         OSError: If it can't be written.
     """
     of_plan = Scanner.of(rig.plan)
-    projectors = [d.planned for d in rig.devices if not isinstance(d.planned, PlannedCamera)]
+    projectors = [
+        d.planned for d in rig.devices if not isinstance(d.planned, PlannedCamera)
+    ]
     cameras = [d.planned for d in rig.devices if isinstance(d.planned, PlannedCamera)]
     scanner = replace(
         of_plan,

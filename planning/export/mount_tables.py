@@ -39,17 +39,19 @@ class MountTables:
     name = "csv"
     what = "CSV of mounts and poses"
     notes = (
-        "mounts.csv: millimetres to 0.01, degrees to 0.001. `x_mm` is the mount where the",
-        "rig file gives one, else the optical centre (`point` says which), out_x its axis",
-        "out of the device; pan, tilt and roll are the housing's, azimuth and elevation",
-        "where the image's centre looks, as `plan show` counts them; `second` is a second",
-        "point to measure: the middle of the housing's top, or 100 mm above the optical",
-        "centre (the device's -y); `axis` is where the optical axis is at the standoff to",
-        "the object's centre. to_D1_mm ...: from either point to the datum points, which",
-        "are the corners of the object's bounding box on the floor (or its lowest face).",
-        "poses.csv: optical centres and quaternions (device to frame, OpenCV axes) with",
-        "all digits, as `plan evaluate --poses` reads it. optics.csv: pixels; the centre",
-        "of the top-left one is (0, 0). Lines that begin with # are comments.",
+        "mounts.csv: millimetres to 0.01, degrees to 0.001. `x_mm` is the mount "
+        "where the rig file gives one, else the optical centre (`point` says "
+        "which), out_x its axis out of the device; pan, tilt and roll are the "
+        "housing's, azimuth and elevation where the image's centre looks, as `plan "
+        "show` counts them; `second` is a second point to measure: the middle of "
+        "the housing's top, or 100 mm above the optical centre (the device's -y); "
+        "`axis` is where the optical axis is at the standoff to the object's "
+        "centre. to_D1_mm ...: from either point to the datum points, which are the "
+        "corners of the object's bounding box on the floor (or its lowest face). "
+        "poses.csv: optical centres and quaternions (device to frame, OpenCV axes) "
+        "with all digits, as `plan evaluate --poses` reads it. optics.csv: pixels; "
+        "the centre of the top-left one is (0, 0). Lines that begin with # are "
+        "comments."
     )
 
     def lacks(self, rig: ExportedRig) -> list[str]:

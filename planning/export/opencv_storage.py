@@ -1,7 +1,5 @@
 """OpenCV: one FileStorage file in YAML with every device."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -17,11 +15,11 @@ class OpencvStorage:
     what = "OpenCV FileStorage"
     notes = (
         "rig.yaml: a node for each device. Metres; OpenCV's camera axes: x right, y "
-        "down, z ahead;",
-        "the centre of the top-left pixel is (0, 0).",
-        "  cv2.projectPoints(points, rvec, tvec, camera_matrix, distortion_coefficients)",
-        "rvec and tvec are of device_from_world. In parallel light there is no camera",
-        "matrix: cv2.perspectiveTransform(points, pixels_from_world) gives u, v, 0.",
+        "down, z ahead; the centre of the top-left pixel is (0, 0). "
+        "cv2.projectPoints(points, rvec, tvec, camera_matrix, "
+        "distortion_coefficients) rvec and tvec are of device_from_world. In "
+        "parallel light there is no camera matrix: cv2.perspectiveTransform(points, "
+        "pixels_from_world) gives u, v, 0."
     )
 
     def lacks(self, rig: ExportedRig) -> list[str]:
@@ -57,7 +55,7 @@ def _node(device: ExportedDevice) -> list[str]:
     return lines + _matrix("world_from_device", device.world_from_device)
 
 
-def _matrix(name: str, values: Array | Sequence[Sequence[float]]) -> list[str]:
+def _matrix(name: str, values: Array) -> list[str]:
     rows, columns = np.shape(values)
     return [
         f"{name}: !!opencv-matrix",

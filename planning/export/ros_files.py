@@ -53,12 +53,13 @@ class RosFiles:
     name = "ros"
     what = "ROS camera_info, static transforms and URDF"
     notes = (
-        "camera_info/ID.yaml: as camera_info_manager reads them, plumb_bob; projectors",
-        "are inverse cameras. static_transforms.launch.py (ROS 2) and rig.urdf have the",
-        "same frames: `world`, ID (x ahead, y left, z up, at the optical centre),",
-        "ID_optical_frame (x right, y down, z ahead; REP 103), ID_mount (z out of the",
-        "device). Metres and radians; the centre of the top-left pixel is (0, 0).",
-        "object.stl and obstacle*.stl: metres, single precision.",
+        "camera_info/ID.yaml: as camera_info_manager reads them, plumb_bob; "
+        "projectors are inverse cameras. static_transforms.launch.py (ROS 2) and "
+        "rig.urdf have the same frames: `world`, ID (x ahead, y left, z up, at the "
+        "optical centre), ID_optical_frame (x right, y down, z ahead; REP 103), "
+        "ID_mount (z out of the device). Metres and radians; the centre of the "
+        "top-left pixel is (0, 0). object.stl and obstacle*.stl: metres, single "
+        "precision."
     )
 
     def lacks(self, rig: ExportedRig) -> list[str]:
@@ -100,9 +101,7 @@ def roll_pitch_yaw(turn: Array) -> list[float]:
     s, c = np.sin(yaw), np.cos(yaw)
     # The rows of R turned back by yaw: pitch is left in the first column.
     pitch = np.arctan2(-turn[2, 0], c * turn[0, 0] + s * turn[1, 0])
-    roll = np.arctan2(
-        s * turn[0, 2] - c * turn[1, 2], c * turn[1, 1] - s * turn[0, 1]
-    )
+    roll = np.arctan2(s * turn[0, 2] - c * turn[1, 2], c * turn[1, 1] - s * turn[0, 1])
     return [float(roll), float(pitch), float(yaw)]
 
 

@@ -20,11 +20,11 @@ class StepFile:
     name = "step"
     what = "STEP AP214"
     notes = (
-        "rig.step: millimetres. A part a device: its housing as a solid, and as curves",
-        "its frustum (down to the depth of the object's centre) and the axes, 50 mm long,",
-        "of its mount, or of its optical centre where the rig file gives no mount (x",
-        "right, y down, z ahead). The object isn't in it: CAD has it already, as a mesh",
-        "it would be thousands of faces.",
+        "rig.step: millimetres. A part a device: its housing as a solid, and as "
+        "curves its frustum (down to the depth of the object's centre) and the "
+        "axes, 50 mm long, of its mount, or of its optical centre where the rig "
+        "file gives no mount (x right, y down, z ahead). The object isn't in it: "
+        "CAD has it already, as a mesh it would be thousands of faces."
     )
 
     def lacks(self, rig: ExportedRig) -> list[str]:
@@ -58,7 +58,8 @@ class _Step:
             f"REPRESENTATION_CONTEXT('',''))"
         )
         self._application = self._added(
-            "APPLICATION_CONTEXT('core data for automotive mechanical design processes')"
+            "APPLICATION_CONTEXT('core data for automotive mechanical design "
+            "processes')"
         )
         self._added(
             f"APPLICATION_PROTOCOL_DEFINITION('international standard',"
@@ -79,9 +80,7 @@ class _Step:
         frames = [self._placement(f"{device.id} optics", device.world_from_device)]
         if device.world_from_mount is not None:
             frames.append(self._placement(f"{device.id} mount", pose))
-        wires = self._added(
-            f"GEOMETRIC_CURVE_SET('{device.id}',({','.join(curves)}))"
-        )
+        wires = self._added(f"GEOMETRIC_CURVE_SET('{device.id}',({','.join(curves)}))")
         shown = self._added(
             f"GEOMETRICALLY_BOUNDED_WIREFRAME_SHAPE_REPRESENTATION('{device.id} wires',"
             f"({','.join([*frames, wires])}),{self._context})"
@@ -121,7 +120,8 @@ class _Step:
         self._added(f"PRODUCT_RELATED_PRODUCT_CATEGORY('part',$,({product}))")
         version = self._added(f"PRODUCT_DEFINITION_FORMATION('','',{product})")
         stage = self._added(
-            f"PRODUCT_DEFINITION_CONTEXT('part definition',{self._application},'design')"
+            f"PRODUCT_DEFINITION_CONTEXT('part definition',{self._application},"
+            f"'design')"
         )
         definition = self._added(f"PRODUCT_DEFINITION('design','',{version},{stage})")
         return self._added(f"PRODUCT_DEFINITION_SHAPE('','',{definition})")

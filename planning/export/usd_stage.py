@@ -21,6 +21,8 @@ _TENTHS = 10.0
 # Width of the sensor that lenses are told for [m]: only ratios matter to a projection.
 _SENSOR_M = 0.036
 _LINE_M = 5e-4
+# Sizes of a lens that are tried for one that single precision keeps.
+_SIZES = 1 << 20
 
 
 class UsdStage:
@@ -29,11 +31,12 @@ class UsdStage:
     name = "usd"
     what = "USD stage"
     notes = (
-        "rig.usda: /rig/object, /rig/obstacles and an Xform a device with its Camera",
-        "`optics`, `body`, `frustum` and `mount`. Metres; cameras look along -z with +y",
-        "up; lens shift is the apertures' offset, parallel light an orthographic camera.",
-        "The attributes ringrig:* of an Xform hold K, distortion and size in double",
-        "precision; USD's own attributes of cameras are single.",
+        "rig.usda: /rig/object, /rig/obstacles and an Xform a device with its "
+        "Camera `optics`, `body`, `frustum` and `mount`. Metres; cameras look along "
+        "-z with +y up; lens shift is the apertures' offset, parallel light an "
+        "orthographic camera. The attributes ringrig:* of an Xform hold K, "
+        "distortion and size in double precision; USD's own attributes of cameras "
+        "are single."
     )
 
     def lacks(self, rig: ExportedRig) -> list[str]:
@@ -41,8 +44,8 @@ class UsdStage:
         if not rig.distorted:
             return []
         return [
-            f"{id_words(rig.distorted)}: distortion stands in ringrig:distortion alone, "
-            f"USD's cameras have none"
+            f"{id_words(rig.distorted)}: distortion stands in ringrig:distortion "
+            f"alone, USD's cameras have none"
         ]
 
     def files(self, rig: ExportedRig) -> dict[str, Content]:
@@ -110,22 +113,44 @@ def _camera(device: ExportedDevice) -> list[str]:
     pixel = length / focal
     if device.lens is None:
         kind, pixel = "orthographic", 1.0 / focal
-    across, down = _TENTHS * pixel * size
     # The middle of the image lies aside of the axis, in USD's axes.
-    aside, upward = _TENTHS * pixel * device.lens_shift * [1.0, -1.0]
-    lines = {
-        "horizontalAperture": across,
-        "verticalAperture": down,
-        "horizontalApertureOffset": aside,
-        "verticalApertureOffset": upward,
-        "focalLength": _TENTHS * length,
-    }
+    aside = pixel * device.lens_shift * [1.0, -1.0]
+    values = _TENTHS * np.array([length, *(pixel * size), *aside])
+    if device.lens is not None:
+        values *= _best_scale(values, size)
+    names = (
+        *("focalLength", "horizontalAperture", "verticalAperture"),
+        *("horizontalApertureOffset", "verticalApertureOffset"),
+    )
     near, far = (0.01, 10.0 * device.reach_m)
     return [
         f'token projection = "{kind}"',
-        *(f"float {key} = {float(value)!r}" for key, value in lines.items()),
+        *(f"float {k} = {float(v)!r}" for k, v in zip(names, values, strict=True)),
         f"float2 clippingRange = ({near}, {far})",
     ]
+
+
+def _best_scale(values: Array, size: Array) -> float:
+    """Return the factor of 1 to 2 that single precision hurts least.
+
+    Only ratios of focal length, apertures and offsets matter, so that a lens may be
+    told larger: of many sizes one has ratios that survive rounding, to 1e-6 px instead
+    of 1e-4 px.
+    """
+    scale = np.linspace(1.0, 2.0, _SIZES, endpoint=False)
+    length, *rest = (
+        (value * scale).astype(np.float32).astype(np.float64) for value in values
+    )
+    worst = np.zeros(_SIZES)
+    for axis in (0, 1):
+        aperture, aside = rest[axis], rest[2 + axis]
+        off_focal = length / aperture * (values[1 + axis] / values[0]) - 1.0
+        off_middle = aside / aperture - values[3 + axis] / values[1 + axis]
+        # At the image's border a focal length's share counts with the distance there.
+        reach = 0.5 + abs(values[3 + axis] / values[1 + axis])
+        off = size[axis] * (np.abs(off_focal) * reach + np.abs(off_middle))
+        worst = np.maximum(worst, off)
+    return float(scale[int(np.argmin(worst))])
 
 
 def _mesh(name: str, mesh: TriangleMesh, title: str = "") -> str:

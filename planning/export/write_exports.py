@@ -1,5 +1,6 @@
 """A format's folder: its files, complete or not at all, and what README.txt says."""
 
+import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ from .exported_rig import Content, ExportedRig, ExportFormat
 README = "README.txt"
 _FIRST = "A rig of ringrig as "
 _FILES = "Files:"
+_WIDTH = 88
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,7 @@ def _readme(
         f"Plan {rig.plan.digest}",
         f"Frame: {rig.frame.words}",
         "",
-        *form.notes,
+        *textwrap.wrap(form.notes, _WIDTH, break_long_words=False),
         "",
         "What the format can't hold:",
         *missing,

@@ -1,36 +1,40 @@
 """A plan with everything that exporters must hold, and points for each device."""
 
 import numpy as np
-from support import reconstruction_rigs as rigs
 
 from planning.export.exported_rig import ExportedDevice
 from planning.model.plan import RigPlan
+from support import reconstruction_rigs as rigs
 
 BODY = {"centre_m": [0.01, 0.0, -0.06], "half_m": [0.03, 0.025, 0.05]}
 FLOOR_M = -0.4
 
 
-def exported_plan(*, parallel: bool = True, distorted: bool = True) -> RigPlan:
+def exported_plan(
+    *, parallel: bool = True, distorted: bool = True, subdivisions: int = 3
+) -> RigPlan:
     """Lens shift in both axes, pixels that aren't square, mounts, housings.
 
     P2 is of parallel light, C1's lens distorts, C2 looks straight down, C3 stands
     already.
     """
-    ball = rigs.bumpy_sphere(0.05, subdivisions=4)
+    ball = rigs.bumpy_sphere(0.05, subdivisions=subdivisions)
     shifted = rigs.diverging("P1", rigs.direction(-35.0, 5.0), 0.055, 3.5e-3)
-    shifted["K"] = [[1792.0, 0.0, 640.25], [0.0, 1780.0, 820.0], [0.0, 0.0, 1.0]]
+    shifted["K"] = [[1792.3456789, 0, 640.256789], [0, 1780.87654321, 820.1], [0, 0, 1]]
     projectors = [shifted]
     if parallel:
-        projectors.append(
-            rigs.parallel("P2", rigs.direction(35.0, 5.0), 0.055, 3.5e-3)
-        )
+        projectors.append(rigs.parallel("P2", rigs.direction(35.0, 5.0), 0.055, 3.5e-3))
     lens = (-0.12, 0.08, 0.001, -0.0008, 0.02) if distorted else (0.0,) * 5
     cameras = [
         rigs.camera("C1", rigs.direction(0.0, -20.0), distortion=lens),
         rigs.camera("C2", rigs.direction(0.0, 90.0)),
-        rigs.camera("C3", rigs.direction(60.0, 25.0)),
+        rigs.camera("C3", rigs.direction(60.0, 25.0), focal=3478.123456789),
     ]
-    cameras[1]["K"] = [[3478.0, 0.0, 1000.5], [0.0, 3478.0, 767.5], [0.0, 0.0, 1.0]]
+    cameras[1]["K"] = [
+        [3478.123457, 0, 1000.512345],
+        [0, 3478.123457, 767.5],
+        [0, 0, 1],
+    ]
     cameras[2] |= {"existing": True, "name": "left wing"}
     for entry in (*projectors, *cameras):
         entry["body"] = BODY

@@ -107,7 +107,7 @@ def check_rendering(options: dict[str, Any]) -> None:
         raise click.UsageError(f"--{given[0]} goes with --renderer mitsuba")
 
 
-class _Formats(click.ParamType):
+class _Formats(click.ParamType[tuple[str, ...]]):
     """Formats between commas, or all of them."""
 
     name = "formats"
@@ -159,9 +159,10 @@ def export(**options: Any) -> None:  # noqa: ANN401
     Exit 1: the plan has something (lens shift, distortion, parallel light) that one of
     the formats can't hold; what was left out is told, and stands in its README.txt.
     """
-    options["targets"] = tuple(dict.fromkeys(sum(options["targets"], ())))
+    targets = tuple(dict.fromkeys(name for some in options["targets"] for name in some))
+    options["targets"] = targets
     light = [name for name in _OF_SURFACE if options[name] is not None]
-    if light and MITSUBA not in options["targets"]:
+    if light and MITSUBA not in targets:
         raise click.UsageError(f"--{light[0]} goes with --to {MITSUBA}")
     from planning.cli.lines.export_lines import export_command
 

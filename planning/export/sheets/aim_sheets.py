@@ -28,12 +28,12 @@ class AimSheets:
     name = "aim"
     what = "aiming sheets"
     notes = (
-        "ID.png: an image of the device's size with a cross-hair in its middle and marks",
-        "L1 to L3. Lay it over a camera's live image and turn the camera until the",
-        "landmarks lie under the marks; let a projector show it and turn that until the",
-        "marks fall onto the landmarks. ID.txt: pixels (the centre of the top-left one is",
-        "(0, 0)), places of the landmarks in mm, distances to the datum points. aim.csv:",
-        "the same of all devices with all digits.",
+        "ID.png: an image of the device's size with a cross-hair in its middle and "
+        "marks L1 to L3. Lay it over a camera's live image and turn the camera "
+        "until the landmarks lie under the marks; let a projector show it and turn "
+        "that until the marks fall onto the landmarks. ID.txt: pixels (the centre "
+        "of the top-left one is (0, 0)), places of the landmarks in mm, distances "
+        "to the datum points. aim.csv: the same of all devices with all digits."
     )
 
     def lacks(self, rig: ExportedRig) -> list[str]:

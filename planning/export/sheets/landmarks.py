@@ -44,7 +44,7 @@ class Landmarks:
         one, two = np.unravel_index(int(np.argmax(apart)), apart.shape)
         ways, base = pixels - pixels[one], pixels[two] - pixels[one]
         area = np.abs(ways[:, 0] * base[1] - ways[:, 1] * base[0])
-        return best[[one, two, int(np.argmax(area))]]
+        return best[[int(one), int(two), int(np.argmax(area))]]
 
     def _visible(self, device: ExportedDevice) -> Mask:
         pose = device.world_from_device

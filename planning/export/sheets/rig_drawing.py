@@ -23,11 +23,12 @@ class RigDrawing:
     name = "drawing"
     what = "DXF drawing"
     notes = (
-        "rig.dxf (R12): millimetres, 1:1. FRONT at its true coordinates; TOP above it, of",
-        "which only the second coordinate is displaced; SIDE to the right, displaced in",
-        "the first. Layers: OBJECT (its convex outline), OBSTACLES, HOUSINGS, FRUSTA,",
-        "POINTS (mount, or else optical centre, of each device; datum points D1 to D4),",
-        "NAMES, DIMENSIONS (each device's point from D1, a row a device).",
+        "rig.dxf (R12): millimetres, 1:1. FRONT at its true coordinates; TOP above "
+        "it, of which only the second coordinate is displaced; SIDE to the right, "
+        "displaced in the first. Layers: OBJECT (its convex outline), OBSTACLES, "
+        "HOUSINGS, FRUSTA, POINTS (mount, or else optical centre, of each device; "
+        "datum points D1 to D4), NAMES, DIMENSIONS (each device's point from D1, a "
+        "row a device)."
     )
 
     def lacks(self, rig: ExportedRig) -> list[str]:
