@@ -11,6 +11,8 @@ Blender's `bpy` needs another numpy than ours: give the interpreter of an enviro
 that has it.
 """
 
+import os
+import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
@@ -20,6 +22,8 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from support import camera_readers as cameras
+from support import solid_readers as solids
 from support.exported_plans import exported_plan, points_before
 
 from planning.export.export_formats import FORMATS
@@ -28,9 +32,6 @@ from planning.export.exported_rig import ExportedDevice, ExportedRig
 from planning.export.mitsuba_export import mitsuba_lacks, write_mitsuba
 from planning.export.write_exports import write_export
 from planning.verify.reconstruction.render.mitsuba.materials import Surface
-
-from . import camera_readers as cameras
-from . import solid_readers as solids
 
 Array = NDArray[np.float64]
 Reader = Callable[[Path, cameras.Points], dict[str, Array]]
@@ -103,8 +104,8 @@ def main() -> None:
             print(_line(row, written), flush=True)
         for interpreter in sys.argv[1:2]:
             print(_line(_blender(interpreter), written))
-            with np.load(written[0][1] / "blender" / "pixels.npz") as pixels:
-                print(f"\nbpy is Blender {pixels['version']}")
+            with np.load(written[1][1] / "blender" / "pixels.npz") as told:
+                print(f"\nbpy is Blender {told['version']}; {told['light']}")
         print("\n| format | reader | compared | mesh axes [mm] | turned frame [mm] |")
         print("|---|---|---|---|---|")
         for name, reader, packages in SOLIDS:
@@ -116,9 +117,14 @@ def main() -> None:
 
 def _blender(interpreter: str) -> Row:
     def by_blender(folder: Path, points: cameras.Points) -> dict[str, Array]:
-        found = cameras.blender(folder, points, interpreter)
-        found.pop("version")
-        return found
+        """By `world_to_camera_view` of a Blender that ran the script."""
+        np.savez(folder / "points.npz", **points)
+        inside = str(Path(__file__).parent / "inside_blender.py")
+        # Our packages aren't that interpreter's.
+        alone = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+        subprocess.run([interpreter, inside, str(folder)], check=True, env=alone)
+        with np.load(folder / "pixels.npz") as pixels:
+            return {name: pixels[name] for name in points}
 
     return "blender", by_blender, (), _straight
 

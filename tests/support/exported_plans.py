@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from geometry.devices import PinholeModel, turned_to
 from planning.export.exported_rig import ExportedDevice
 from planning.model.plan import RigPlan
 from support import reconstruction_rigs as rigs
@@ -21,12 +22,17 @@ def exported_plan(
     ball = rigs.bumpy_sphere(0.05, subdivisions=subdivisions)
     shifted = rigs.diverging("P1", rigs.direction(-35.0, 5.0), 0.055, 3.5e-3)
     shifted["K"] = [[1792.3456789, 0, 640.256789], [0, 1780.87654321, 820.1], [0, 0, 1]]
+    # The middle of its image looks at the object, as a planned one's does.
+    lens = PinholeModel(np.array(shifted["K"]), (1280, 800), (0.5, 2.0))
+    pose = np.array(shifted["world_from_device"])
+    pose[:3, :3] = pose[:3, :3] @ turned_to(lens.middle_ray)
+    shifted["world_from_device"] = np.round(pose, 12).tolist()
     projectors = [shifted]
     if parallel:
         projectors.append(rigs.parallel("P2", rigs.direction(35.0, 5.0), 0.055, 3.5e-3))
-    lens = (-0.12, 0.08, 0.001, -0.0008, 0.02) if distorted else (0.0,) * 5
+    bent = (-0.12, 0.08, 0.001, -0.0008, 0.02) if distorted else (0.0,) * 5
     cameras = [
-        rigs.camera("C1", rigs.direction(0.0, -20.0), distortion=lens),
+        rigs.camera("C1", rigs.direction(0.0, -20.0), distortion=bent),
         rigs.camera("C2", rigs.direction(0.0, 90.0)),
         rigs.camera("C3", rigs.direction(60.0, 25.0), focal=3478.123456789),
     ]

@@ -95,13 +95,14 @@ def _draw(device: ExportedDevice, pixels: Array, file: BinaryIO) -> None:
     width, height = device.model.resolution
     image = Image.new("L", (width, height), 0)
     pen = ImageDraw.Draw(image)
-    mark = max(4.0, _MARK * height)
+    mark = max(4, round(_MARK * height))
     line = max(1, round(0.1 * mark))
-    across, down = 0.5 * (width - 1), 0.5 * (height - 1)
+    across, down = width // 2, height // 2
     pen.line([(0, down), (width - 1, down)], fill=128, width=line)
     pen.line([(across, 0), (across, height - 1)], fill=128, width=line)
     font = ImageFont.load_default(1.5 * mark)
-    for k, (u, v) in enumerate(pixels.tolist(), 1):
+    # Pillow cuts decimals off: whole pixels, the nearest.
+    for k, (u, v) in enumerate(np.rint(pixels).tolist(), 1):
         pen.ellipse([u - mark, v - mark, u + mark, v + mark], outline=255, width=line)
         pen.line([(u - 2 * mark, v), (u + 2 * mark, v)], fill=255, width=line)
         pen.line([(u, v - 2 * mark), (u, v + 2 * mark)], fill=255, width=line)

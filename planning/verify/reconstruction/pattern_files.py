@@ -6,7 +6,7 @@ by the projector's response.
 
 import json
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -64,10 +64,12 @@ def pattern_contents(
     files: dict[str, Callable[[BinaryIO], object]] = {}
     entries: list[dict[str, Any]] = []
     for p, projector in enumerate(scanner.projectors):
-        frames, drawn = scanner.frames(p), drawn_by(projector, scanner.cameras)
+        frames = scanner.frames(p)
+        # Once a projector, and not before a file is written.
+        drawer = cache(partial(drawn_by, projector, scanner.cameras))
         for frame in frames:
             path = f"{projector.id}/{frame.name}.png"
-            files[path] = _png_writer(partial(drawn, frame))
+            files[path] = _png_writer(drawer, frame)
         entries.append(
             {
                 "id": projector.id,
@@ -142,9 +144,9 @@ def _manifest(folder: Path) -> dict[str, Any]:
 
 
 def _png_writer(
-    drawn: Callable[[], NDArray[np.uint8]],
+    drawer: Callable[[], Callable[[Frame], NDArray[np.uint8]]], frame: Frame
 ) -> Callable[[BinaryIO], object]:
     # Frames are large and flat: the fastest packing is small enough.
-    return lambda file: Image.fromarray(drawn()).save(
+    return lambda file: Image.fromarray(drawer()(frame)).save(
         file, format="PNG", compress_level=1
     )

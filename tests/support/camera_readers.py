@@ -6,7 +6,6 @@ those devices that the format holds, the centre of the top-left one at (0, 0).
 
 import ast
 import csv
-import subprocess
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -233,19 +232,6 @@ def aim_table(folder: Path, points: Points) -> dict[str, tuple[Array, Array]]:
     return found
 
 
-def blender(folder: Path, points: Points, interpreter: str) -> dict[str, Array]:
-    """By `world_to_camera_view` of a Blender that ran the script."""
-    np.savez(folder / "points.npz", **points)
-    here = Path(__file__).parent / "inside_blender.py"
-    ran = subprocess.run(
-        [interpreter, str(here), str(folder)], capture_output=True, text=True
-    )
-    if ran.returncode:
-        raise RuntimeError(ran.stderr[-2000:])
-    with np.load(folder / "pixels.npz") as pixels:
-        return dict(pixels)
-
-
 def mitsuba(folder: Path, points: Points) -> dict[str, Array]:
     """By where Mitsuba's sensors see points, and its projectors light them."""
     import mitsuba as mi
@@ -265,7 +251,7 @@ def mitsuba(folder: Path, points: Points) -> dict[str, Array]:
     return found
 
 
-def _at(mi: Any, points: Array) -> Any:  # noqa: ANN401
+def _at(mi: Any, points: Array) -> Any:
     interaction = mi.SurfaceInteraction3f()
     interaction.p = mi.Point3f(points.T.astype(np.float32))
     return interaction
@@ -288,7 +274,7 @@ def _into(world_from_local: Array, world: Array) -> Array:
     return np.linalg.solve(world_from_local, np.c_[world, np.ones(len(world))].T)[:3].T
 
 
-def _pixels(ndc: Array, size: Any) -> Array:  # noqa: ANN401
+def _pixels(ndc: Array, size: Any) -> Array:
     """Of coordinates from -1 to 1, y up, across the image."""
     width, height = size
     across, down = 0.5 * width * (1.0 + ndc[:, 0]), 0.5 * height * (1.0 - ndc[:, 1])
