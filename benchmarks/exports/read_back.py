@@ -26,11 +26,11 @@ from support import camera_readers as cameras
 from support import solid_readers as solids
 from support.exported_plans import exported_plan, points_before
 
-from planning.export.export_formats import FORMATS
-from planning.export.export_frames import frame_of
-from planning.export.exported_rig import ExportedDevice, ExportedRig
-from planning.export.mitsuba_export import mitsuba_lacks, write_mitsuba
-from planning.export.write_exports import write_export
+from planning.report.export.export_formats import FORMATS
+from planning.report.export.export_frames import frame_of
+from planning.report.export.exported_rig import ExportedDevice, ExportedRig
+from planning.report.export.mitsuba_export import mitsuba_lacks, write_mitsuba
+from planning.report.export.write_exports import write_export
 from planning.verify.reconstruction.render.mitsuba.materials import Surface
 
 Array = NDArray[np.float64]
@@ -122,7 +122,12 @@ def _blender(interpreter: str) -> Row:
         inside = str(Path(__file__).parent / "inside_blender.py")
         # Our packages aren't that interpreter's.
         alone = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
-        subprocess.run([interpreter, inside, str(folder)], check=True, env=alone)
+        subprocess.run(
+            [interpreter, inside, str(folder)],
+            check=True,
+            env=alone,
+            capture_output=True,
+        )
         with np.load(folder / "pixels.npz") as pixels:
             return {name: pixels[name] for name in points}
 

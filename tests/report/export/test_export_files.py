@@ -18,12 +18,12 @@ from support.solid_readers import mounts
 from geometry.devices import PinholeModel
 from geometry.files.readers import load_mesh
 from geometry.poses import inverse, transform
-from planning.export.export_formats import FORMATS
-from planning.export.export_frames import frame_of
-from planning.export.exported_rig import ExportedRig
-from planning.export.ros_files import roll_pitch_yaw
-from planning.export.sheets.landmarks import Landmarks
-from planning.export.write_exports import write_export
+from planning.report.export.export_formats import FORMATS
+from planning.report.export.export_frames import frame_of
+from planning.report.export.exported_rig import ExportedRig
+from planning.report.export.ros_files import roll_pitch_yaw
+from planning.report.export.sheets.landmarks import Landmarks
+from planning.report.export.write_exports import write_export
 from planning.rig.mounted import read_mounted
 from planning.rig.rig import load_rig
 
