@@ -9,7 +9,7 @@ from geometry.poses import transform
 from geometry.rays.rays import RayCaster
 from planning.report.export.exported_rig import ExportedDevice, ExportedRig
 
-# Least cosine between a landmark's normal and the way to the device.
+# Least cosine between the normal of a landmark's best face and the way to the device.
 _LEAST_FACING = 0.35
 # They stay so far inside the image, as a share of its sides.
 _BORDER = 0.04
@@ -26,7 +26,7 @@ class Landmarks:
         mesh = rig.mesh
         self.vertices = mesh.vertices
         self._curvedness = np.nan_to_num(principal_curvatures(mesh).curvedness)
-        self._normals = _vertex_normals(mesh)
+        self._mesh = mesh
         solid = TriangleMesh.joined([mesh, *rig.obstacles.values()])
         self._caster = RayCaster(solid, threads=1)
         self._short = _SHORT * mesh.radius
@@ -59,15 +59,20 @@ class Landmarks:
         inside = (pixels > spare - 0.5) & (pixels < size - 0.5 - spare)
         seen = inside.all(axis=1) & (local[:, 2] > 0.0)
         seen &= device.model.in_field(local)
-        seen &= -np.einsum("ij,ij->i", along, self._normals) > _LEAST_FACING
+        seen &= self._facing(device) > _LEAST_FACING
         rows = np.flatnonzero(seen)
         reach = np.maximum(far[rows] - self._short, 0.0)
         seen[rows] = ~self._caster.occluded(starts[rows], along[rows], reach)
         return seen
 
-
-def _vertex_normals(mesh: TriangleMesh) -> Array:
-    normals = np.zeros_like(mesh.vertices)
-    weighted = mesh.face_normals * mesh.face_areas[:, None]
-    np.add.at(normals, mesh.faces.ravel(), np.repeat(weighted, 3, axis=0))
-    return normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
+    def _facing(self, device: ExportedDevice) -> Array:
+        """Return how squarely the best face of each vertex is met, a cosine, (n_v,)."""
+        mesh, pose = self._mesh, device.world_from_device
+        local = transform(device.device_from_world, mesh.face_centroids)
+        starts = transform(pose, device.model.ray_starts(local))
+        ways = starts - mesh.face_centroids
+        far = np.maximum(np.linalg.norm(ways, axis=1), 1e-12)
+        cosines = np.einsum("ij,ij->i", ways, mesh.face_normals) / far
+        best = np.full(len(mesh.vertices), -1.0)
+        np.maximum.at(best, mesh.faces.ravel(), np.repeat(cosines, 3))
+        return best
