@@ -59,7 +59,7 @@ class RosFiles:
         "optical centre), ID_optical_frame (x right, y down, z ahead; REP 103), "
         "ID_mount (z out of the device). Metres and radians; the centre of the "
         "top-left pixel is (0, 0). object.stl and obstacle*.stl: metres, single "
-        "precision."
+        "precision; the URDF names them by their place beside it."
     )
 
     def lacks(self, rig: ExportedRig) -> list[str]:

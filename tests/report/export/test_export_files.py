@@ -66,6 +66,12 @@ def holds(device, pose, matrix, distortion=(0.0,) * 5):
     np.testing.assert_allclose(pixels, device.project(points), atol=EXACT_PX)
 
 
+def has_corners(points, device, within):
+    """Whether all corners of a device's housing are among points (n, 3)."""
+    apart = np.linalg.norm(points[:, None] - device.box.corners, axis=2)
+    return apart.min(axis=0).max() < within
+
+
 def pose_of(quaternion_wxyz, translation):
     pose = np.eye(4)
     pose[:3, :3] = Rotation.from_quat(np.roll(quaternion_wxyz, -1)).as_matrix()
@@ -158,17 +164,23 @@ def test_a_glb_has_a_node_a_device_and_our_own_reader_reads_it(rig, folder):
         for a, b, c in (device.box.half for device in rig.devices)
     )
     assert mesh.area == pytest.approx(rig.mesh.area + boxes, rel=1e-5)
+    for device in rig.devices:
+        assert has_corners(mesh.vertices, device, 1e-6)
+
+
+def origin_of(element):
+    angles = numbers_of(element.get("rpy"))
+    pose = np.eye(4)
+    pose[:3, 3] = numbers_of(element.get("xyz"))
+    pose[:3, :3] = Rotation.from_euler("xyz", angles).as_matrix()
+    return pose
 
 
 def test_ros_frames_re_project(rig, folder):
     tree = Xml.parse(folder / "ros" / "rig.urdf").getroot()
     poses = {"world": np.eye(4)}
     for joint in tree.findall("joint"):
-        origin = joint.find("origin")
-        pose = np.eye(4)
-        pose[:3, 3] = numbers_of(origin.get("xyz"))
-        angles = numbers_of(origin.get("rpy"))
-        pose[:3, :3] = Rotation.from_euler("xyz", angles).as_matrix()
+        pose = origin_of(joint.find("origin"))
         child, parent = joint.find("child"), joint.find("parent")
         poses[child.get("link")] = poses[parent.get("link")] @ pose
     for device in rig.devices:
@@ -180,6 +192,11 @@ def test_ros_frames_re_project(rig, folder):
             data = {name: numbers_of(values) for name, values in blocks}
             matrix = data["camera_matrix"].reshape(3, 3)
             holds(device, pose, matrix, data["distortion_coefficients"])
+        box = tree.find(f"link[@name='{device.id}']/visual")
+        size = numbers_of(box.find("geometry/box").get("size"))
+        place = poses[device.id] @ origin_of(box.find("origin"))
+        signs = np.array([[a, b, c] for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)])
+        assert has_corners(transform(place, 0.5 * signs * size), device, 1e-12)
         # REP 103: x of the body is the optical axis, z its way up.
         np.testing.assert_allclose(poses[device.id][:3, 0], pose[:3, 2], atol=1e-12)
         np.testing.assert_allclose(poses[device.id][:3, 2], -pose[:3, 1], atol=1e-12)
@@ -216,6 +233,9 @@ def test_usd_s_cameras_re_project_in_single_precision(rig, folder):
         scale = camera["focalLength"] if device.lens else 10.0
         matrix = np.diag([*(size * scale / opening), 1.0])
         matrix[:2, 2] = middle
+        body = re.search(r'def Mesh "body"(?:.*\n)*?.*points = (.*)', block)[1]
+        corners = transform(pose @ CV_FROM_GL, numbers_of(body[1:]).reshape(-1, 3))
+        assert has_corners(corners, device, 1e-12)
         # Distortion is what USD's cameras lack.
         straight = replace(device.planned, device=device.model)
         if device.lens is not None:
@@ -248,7 +268,10 @@ def test_step_s_solids_are_closed_and_where_the_housings_are(rig, folder):
     senses = re.findall(r"ORIENTED_EDGE\('',\*,\*,#(\d+),\.([TF])\.\)", text)
     n = len(rig.devices)
     assert len(senses) == 24 * n
-    assert len(set(senses)) == 24 * n, "every edge once each way"
+    # Every edge twice, once each way.
+    assert {edge for edge, _ in senses} == {edge for edge, way in senses if way == "T"}
+    assert len({edge for edge, _ in senses}) == 12 * n
+    assert len(set(senses)) == 24 * n
     points = {
         name: numbers_of(body[body.index(",") :])
         for name, body in entities.items()
@@ -336,6 +359,8 @@ def test_blender_s_script_compiles_and_its_numbers_re_project(rig):
         matrix = [[fx, 0.0, middle[0]], [0.0, fy, middle[1]], [0.0, 0.0, 1.0]]
         np.testing.assert_allclose(matrix, device.panel_matrix, rtol=1e-12)
         holds(device, pose, matrix, entry["distortion"] or (0.0,) * 5)
+        corners = transform(pose @ CV_FROM_GL, np.array(entry["body"]))
+        assert has_corners(corners, device, 1e-12)
         if device.kind == "projector":
             assert entry["pattern"] in files
             # The light's z is behind it: x / z is the slope to the left.
