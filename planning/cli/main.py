@@ -96,7 +96,7 @@ def commands() -> None:
     plan calibrate face-plan/plan.json        images of a board that calibrate the rig
     plan play face-plan P1 --hold 1           a projector's frames, and captures of them
     plan reconstruct face-plan/plan.json      a cloud from rendered or captured images
-    plan export face-plan --to mitsuba        scenes for a renderer that isn't ours
+    plan export face-plan --to ros,csv        for ROS, COLMAP, Blender, CAD, builders
 
     Exit: 0 planned and checked, 1 a requirement is missed, 2 usage, 3 bad input,
     4 nothing can be served, 5 time limit, 130 interrupted.

@@ -1,4 +1,4 @@
-"""What `plan sample`, `export` and `calibrate` do."""
+"""What `plan sample` and `calibrate` do."""
 
 import math
 from collections.abc import Mapping
@@ -18,7 +18,6 @@ from geometry.shapes.sample_head.sample_head import (
 )
 from planning.model.files import write_atomically
 from planning.model.plan import RigPlan
-from planning.model.words import count_words
 from planning.verify.board_images.board import board_for
 from planning.verify.board_images.board_lines import (
     board_document,
@@ -26,11 +25,8 @@ from planning.verify.board_images.board_lines import (
     board_lines,
 )
 from planning.verify.board_images.chosen_images import plan_images
-from planning.verify.reconstruction.render.mitsuba.materials import Surface
-from planning.verify.reconstruction.render.mitsuba.scene_files import write_scenes
-from planning.verify.reconstruction.scanner import Scanner
 
-from .console import given, print_json, reporter, writable
+from .console import print_json, reporter, writable
 
 
 def calibrate_command(options: Mapping[str, Any]) -> int:
@@ -111,25 +107,3 @@ def write_sample(
     text = head_as_obj(mesh, "open at the neck")
     write_atomically(Path(path), lambda file: file.write(text.encode("ascii")))
     return mesh
-
-
-def export_command(options: Mapping[str, Any]) -> int:
-    """Write a scene for each projector of a plan; print where they are."""
-    path, report = Path(options["plan_file"]), reporter(quiet=options["quiet"])
-    scanner = Scanner.of(RigPlan.load(path))
-    folder = options["output"] or path.parent / options["target"]
-    with writable(folder):
-        report("drawing the patterns")
-        scenes = write_scenes(
-            scanner,
-            folder,
-            Surface(**given(options, "albedo", "texture")),
-            **{"ambient": scanner.limits.check.ambient} | given(options, "ambient"),
-        )
-    if options["as_json"]:
-        print_json({"folder": str(folder), "scenes": [str(scene) for scene in scenes]})
-    else:
-        names = ", ".join(scene.name for scene in scenes)
-        cameras = count_words(len(scanner.cameras), "camera")
-        click.echo(f"{folder}: {names} with {cameras} each, see README.txt")
-    return 0

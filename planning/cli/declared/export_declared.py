@@ -8,8 +8,13 @@ import click
 
 from planning.cli.console import Finite, PlanFile, output_options, run
 
-_BUILT = ("mitsuba",)
-_PLANNED = ("opencv", "colmap", "gltf", "blender", "ros", "usd", "csv", "step")
+MITSUBA = "mitsuba"
+# As `planning.report.export.export_formats` has them, which is heavy to import.
+FORMATS = (
+    *("opencv", "colmap", "gltf", "blender", "ros", "usd", "csv"),
+    *("step", "drawing", "aim", MITSUBA),
+)
+_ALL = "all"
 _OF_SURFACE = ("albedo", "texture", "ambient")
 _OF_MITSUBA = ("material", *_OF_SURFACE, "gamma", "vignetting", "bounces", "spp")
 _Command = Callable[..., Any]
@@ -102,31 +107,63 @@ def check_rendering(options: dict[str, Any]) -> None:
         raise click.UsageError(f"--{given[0]} goes with --renderer mitsuba")
 
 
+class _Formats(click.ParamType[tuple[str, ...]]):
+    """Formats between commas, or all of them."""
+
+    name = "formats"
+
+    def convert(
+        self,
+        value: Any,  # noqa: ANN401
+        param: click.Parameter | None,
+        ctx: click.Context | None,
+    ) -> tuple[str, ...]:
+        """Return their names, or fail as usage."""
+        names = tuple(name.strip() for name in str(value).split(","))
+        for name in names:
+            if name not in (*FORMATS, _ALL):
+                self.fail(f"{name!r} is none of {', '.join((*FORMATS, _ALL))}.")
+        return FORMATS if _ALL in names else names
+
+
 @click.command()
 @click.argument("plan_file", type=PlanFile(), metavar="DIR[/plan.json]")
 @click.option(
     "--to",
-    "target",
+    "targets",
     required=True,
-    type=click.Choice((*_BUILT, *_PLANNED)),
-    help="Format; only mitsuba is built yet.",
+    multiple=True,
+    type=_Formats(),
+    metavar="FORMAT[,...]",
+    help=f"{', '.join(FORMATS)}; several at once, or {_ALL}.",
+)
+@click.option(
+    "--frame",
+    metavar="X,Y,Z[,AZ,TILT,ROLL]",
+    help="Another origin, in mm and degrees of the mesh's axes; or `floor` (under the "
+    "object's centre), or a mounting plane's name [default: the mesh's].",
 )
 @click.option(
     "-o",
     "--output",
     type=click.Path(path_type=Path),
     metavar="DIR",
-    help="Where it goes [default: a folder named like the format in the plan's].",
+    help="Each format gets a folder of its name in there [default: `export` beside the "
+    "plan]. mitsuba by itself goes into DIR [default: `mitsuba` beside the plan].",
 )
 @surface_options
 @output_options
 def export(**options: Any) -> None:  # noqa: ANN401
-    """Write a rig for another program: a scene that Mitsuba 3 renders."""
-    if options["target"] in _PLANNED:
-        raise click.UsageError(
-            f"`plan export --to {options['target']}` isn't built yet; built is "
-            f"{', '.join(_BUILT)}"
-        )
-    from planning.cli.other_commands import export_command
+    """Write a rig for other programs, a builder and a workshop.
+
+    Exit 1: the plan has something (lens shift, distortion, parallel light) that one of
+    the formats can't hold; what was left out is told, and stands in its README.txt.
+    """
+    targets = tuple(dict.fromkeys(name for some in options["targets"] for name in some))
+    options["targets"] = targets
+    light = [name for name in _OF_SURFACE if options[name] is not None]
+    if light and MITSUBA not in targets:
+        raise click.UsageError(f"--{light[0]} goes with --to {MITSUBA}")
+    from planning.cli.lines.export_lines import export_command
 
     run(lambda: export_command(options), debug=options["debug"])

@@ -6,7 +6,7 @@ by the projector's response.
 
 import json
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -57,23 +57,19 @@ def drawn_by(
     )
 
 
-def write_patterns(scanner: Scanner, folder: Path) -> Path:
-    """Write `patterns/` into a plan's folder: PNG images and `sequence.json`.
-
-    Returns the folder of the patterns.
-
-    Raises:
-        OSError: If it can't be written.
-    """
-    place = folder / FOLDER
-    files: dict[Path, Callable[[BinaryIO], object]] = {}
+def pattern_contents(
+    scanner: Scanner,
+) -> dict[str, Callable[[BinaryIO], object]]:
+    """Return what writes each file of `patterns/`: PNG images, then `sequence.json`."""
+    files: dict[str, Callable[[BinaryIO], object]] = {}
     entries: list[dict[str, Any]] = []
     for p, projector in enumerate(scanner.projectors):
-        frames, drawn = scanner.frames(p), drawn_by(projector, scanner.cameras)
-        (place / projector.id).mkdir(parents=True, exist_ok=True)
+        frames = scanner.frames(p)
+        # Once a projector, and not before a file is written.
+        drawer = cache(partial(drawn_by, projector, scanner.cameras))
         for frame in frames:
-            path = place / projector.id / f"{frame.name}.png"
-            files[path] = _png_writer(partial(drawn, frame))
+            path = f"{projector.id}/{frame.name}.png"
+            files[path] = _png_writer(drawer, frame)
         entries.append(
             {
                 "id": projector.id,
@@ -95,7 +91,22 @@ def write_patterns(scanner: Scanner, folder: Path) -> Path:
         "projectors": entries,
     }
     text = json.dumps(manifest, indent=1, allow_nan=False) + "\n"
-    files[place / _MANIFEST] = lambda file: file.write(text.encode())
+    files[_MANIFEST] = lambda file: file.write(text.encode())
+    return files
+
+
+def write_patterns(scanner: Scanner, folder: Path) -> Path:
+    """Write `patterns/` into a plan's folder.
+
+    Returns the folder of the patterns.
+
+    Raises:
+        OSError: If it can't be written.
+    """
+    place = folder / FOLDER
+    files = {place / name: write for name, write in pattern_contents(scanner).items()}
+    for path in files:
+        path.parent.mkdir(parents=True, exist_ok=True)
     write_together(files)
     return place
 
@@ -133,9 +144,9 @@ def _manifest(folder: Path) -> dict[str, Any]:
 
 
 def _png_writer(
-    drawn: Callable[[], NDArray[np.uint8]],
+    drawer: Callable[[], Callable[[Frame], NDArray[np.uint8]]], frame: Frame
 ) -> Callable[[BinaryIO], object]:
     # Frames are large and flat: the fastest packing is small enough.
-    return lambda file: Image.fromarray(drawn()).save(
+    return lambda file: Image.fromarray(drawer()(frame)).save(
         file, format="PNG", compress_level=1
     )

@@ -1,0 +1,1 @@
+"""Exports read back by the other side's own code."""

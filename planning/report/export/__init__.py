@@ -1,0 +1,1 @@
+"""Rigs for other programs: one file a format, all listed in `export_formats`."""
