@@ -10,10 +10,8 @@ from threadpoolctl import threadpool_limits
 from geometry.mesh.mesh import TriangleMesh
 from planning.model.document.certificates import CamerasBy
 from planning.model.document.device_records import RingAxis
-from planning.model.errors import InputError
 from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
 from planning.model.progress import TIME_IS_UP, Report, Stopwatch
-from planning.model.words import count_words
 from planning.report.assemble import write_plan
 from planning.report.entries.cost_entry import cost_record
 from planning.report.partial_plan import PartialPlan, PlanRequest
@@ -25,9 +23,9 @@ from planning.rig.rig import Rig
 from planning.rig.wishes import AccuracyOf, TargetName, Wishes
 from planning.scene.interest import Select, Weight
 from planning.scene.ranges.ranged_body import RangedBody
-from planning.verify.verification import verify_plan
+from planning.verify.verification import Verification, verify_plan
 
-from .prepare import prepared, request_of
+from .prepare import prepared, request_of, standing
 from .stages import (
     as_they_stand,
     bounded_cameras,
@@ -40,6 +38,7 @@ from .stages import (
 )
 
 Keep = Callable[[RigPlan], None]
+Checked = Callable[[RigPlan, Verification], None]
 # Time kept for writing, in times that writing the first plan took.
 _WRITING = 1.25
 
@@ -71,6 +70,7 @@ def plan_rig(
     progress: Report | None = None,
     command: Sequence[str] = (),
     keep: Keep | None = None,
+    checked: Checked | None = None,
     fixed: Mounted | None = None,
 ) -> RigPlan:
     """Plan the projectors and cameras that measure a surface, and check the plan.
@@ -114,6 +114,7 @@ def plan_rig(
         command: Words of the command line, for the record.
         keep: Receives the plan when it is made and not yet checked; with a time limit
             also the first one, before its poses are improved.
+        checked: Receives it with what the check found.
         fixed: Devices that stay where they are and count, from `read_mounted`.
 
     Returns:
@@ -128,7 +129,7 @@ def plan_rig(
     rig = rig if fixed is None else fixed.on(rig)
     evaluates = max_projectors is None
     if max_projectors is None:
-        max_projectors, max_cameras = _standing(rig)
+        max_projectors, max_cameras = standing(rig)
     wishes = Wishes(
         max_projectors=max_projectors,
         max_cameras=max_cameras,
@@ -159,13 +160,13 @@ def plan_rig(
         planned = _evaluated if evaluates else robustly(_planned)
         plan, partial = planned(request, clock, keep)
         if check and not plan.document.truncated:
-            plan = _checked(plan, partial, clock, keep)
+            plan = _checked(plan, partial, clock, keep, checked)
             if axes_may_help(plan, partial):
                 clock.say("  centred ring axes don't pass the check: free ones")
                 freed = replace(request, axis_wanted="free")
                 other, partial = planned(freed, clock, keep)
                 if not other.document.truncated:
-                    other = _checked(other, partial, clock, keep)
+                    other = _checked(other, partial, clock, keep, checked)
                     plan = plan if missed_by(other, check=True) else other
     if missed := missed_by(plan, check=check):
         raise RequirementError(plan, missed)
@@ -188,23 +189,6 @@ def missed_by(plan: RigPlan, *, check: bool) -> tuple[str, ...]:
     if check and plan.document.reconstruction is None:
         missed += ("the check wasn't made: the time limit came first",)
     return missed
-
-
-def _standing(rig: Rig) -> tuple[int, int]:
-    """How many projectors and cameras of a rig stand already.
-
-    Raises:
-        InputError: If none of either does.
-    """
-    kinds = [table.kind for table in rig.table.existing]
-    counts = kinds.count("projector"), kinds.count("camera")
-    if not all(counts):
-        raise InputError(
-            f"{count_words(counts[0], 'projector')} and "
-            f"{count_words(counts[1], 'camera')} stand; a rig measures with one of "
-            f"either or more"
-        )
-    return counts
 
 
 def _evaluated(
@@ -273,7 +257,11 @@ def _first_plan(request: PlanRequest, clock: Stopwatch) -> PartialPlan:
 
 
 def _checked(
-    plan: RigPlan, partial: PartialPlan, clock: Stopwatch, keep: Keep | None
+    plan: RigPlan,
+    partial: PartialPlan,
+    clock: Stopwatch,
+    keep: Keep | None,
+    checked: Checked | None,
 ) -> RigPlan:
     """Audit the kept plan and reconstruct it from pixels, with foreign code.
 
@@ -293,6 +281,8 @@ def _checked(
         raise InterruptedPlanError(cut) from None
     except TIME_IS_UP:
         return cut
+    if checked is not None:
+        checked(plan, verification)
     check, record = verification.reconstruction, None
     if check is not None:
         false = verification.audit.failures

@@ -18,6 +18,7 @@ from planning.model.errors import InputError
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
+from planning.model.words import count_words
 from planning.projectors.candidate_set import CandidateSource
 from planning.report.partial_plan import PlanRequest, Prepared
 from planning.rig.range_guard import Guard, guarded
@@ -207,3 +208,20 @@ def offered(ready: Prepared) -> tuple[tuple[PlannedProjector, ...], CandidateVie
         (*existing_devices(required, ready.template), *projectors),
         CandidateViews(scene, (*existing_devices(required, ready.camera), *cameras)),
     )
+
+
+def standing(rig: Rig) -> tuple[int, int]:
+    """How many projectors and cameras of a rig stand already.
+
+    Raises:
+        InputError: If none of either does.
+    """
+    kinds = [table.kind for table in rig.table.existing]
+    counts = kinds.count("projector"), kinds.count("camera")
+    if not all(counts):
+        raise InputError(
+            f"{count_words(counts[0], 'projector')} and "
+            f"{count_words(counts[1], 'camera')} stand; a rig measures with one of "
+            f"either or more"
+        )
+    return counts

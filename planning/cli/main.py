@@ -16,6 +16,7 @@ from planning.cli.declared.export_declared import export
 from planning.cli.declared.other_declared import (
     accept,
     lens,
+    report,
     rigs,
     sample,
     schema,
@@ -27,10 +28,6 @@ from planning.cli.declared.reconstruct_declared import reconstruct
 from planning.cli.declared.tolerance_declared import tolerance
 
 from .console import stop, stop_signals
-
-_NOT_BUILT = {
-    "report": "writes one self-contained HTML file",
-}
 
 
 class _DefaultGroup(click.Group):
@@ -88,6 +85,7 @@ def commands() -> None:
     plan verify face-plan/plan.json           recomputes every claim, checks again
     plan accept face-plan/plan.json           a maker's figures: ball bars, plates
     plan show face-plan/plan.json             every place in mesh axes, camera by camera
+    plan report face-plan                     one HTML file: rig, causes, tables
     plan tolerance face-plan --mount 2mm,0.2deg
                                               how well devices must be mounted
     plan lens --mesh face.obj                 which lens and focus suit an object
@@ -102,29 +100,9 @@ def commands() -> None:
 
 for _command in (
     *(rig_command, evaluate, verify, accept, show, reconstruct, tolerance, export),
-    *(lens, calibrate, rigs, schema, sample),
+    *(report, lens, calibrate, rigs, schema, sample),
 ):
     commands.add_command(_command)
-
-
-def _not_built(name: str, purpose: str) -> None:
-    @commands.command(
-        name,
-        short_help=f"(not built yet) {purpose}",
-        context_settings={
-            "ignore_unknown_options": True,
-            "help_option_names": ["--help"],
-        },
-    )
-    @click.argument("anything", nargs=-1, type=click.UNPROCESSED)
-    def command(anything: tuple[str, ...]) -> None:
-        raise click.UsageError(f"`plan {name}` isn't built yet; it {purpose}")
-
-    command.help = f"Not built yet: {purpose}."
-
-
-for _name, _purpose in _NOT_BUILT.items():
-    _not_built(_name, _purpose)
 
 
 def main() -> None:

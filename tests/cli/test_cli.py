@@ -303,7 +303,7 @@ def test_a_signal_while_a_plan_is_saved_costs_no_second_saving(
         (["export", "plan.json", "--to", "ros"], 2, "isn't built yet"),
         (["export", "no.json", "--to", "mitsuba"], 3, "no such file"),
         (["verify", "no.json", "--spp", "8"], 2, "--spp goes with --renderer mitsuba"),
-        (["report", "plan.json"], 2, "isn't built yet"),
+        (["report", "plan.json"], 3, "no such file"),
         (["reconstruct", "no.json"], 3, "no such file"),
     ],
 )

@@ -180,6 +180,7 @@ from planning.cli.console import (
 @click.option("--prove", is_flag=True, help="Spend more work on the continuous bounds.")
 @click.option("--no-check", is_flag=True, help="Skip the check from pixels.")
 @click.option("--no-patterns", is_flag=True, help="Write no pattern images.")
+@click.option("--no-report", is_flag=True, help="Write no report.html.")
 @output_options
 def rig_command(**options: Any) -> None:  # noqa: ANN401
     """Plan a rig for a mesh, or for ranges (the default command)."""

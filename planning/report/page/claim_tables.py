@@ -1,11 +1,11 @@
-"""Tables of what a plan claims: areas, proofs, regions, marginal counts, check, cost."""
+"""Tables of what a plan claims: areas, proofs, regions, more or fewer, check, cost."""
 
 from collections.abc import Iterator
 
 import numpy as np
 
 from planning.model.document.certificates import Certificate
-from planning.model.document.coverage_records import CameraMarginal, ProjectorMarginal
+from planning.model.document.coverage_records import ProjectorMarginal
 from planning.model.plan import RigPlan
 from planning.model.words import area_words, percent
 from planning.report.summary.region_lines import region_place
@@ -174,7 +174,7 @@ def _marginal(plan: RigPlan) -> Iterator[str]:
                     "" if share is None else percent(share),
                 ]
             )
-        elif isinstance(row, CameraMarginal):
+        else:
             measured.append(
                 [
                     _planned(row.n_cameras, len(plan.cameras)),

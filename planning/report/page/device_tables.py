@@ -52,11 +52,12 @@ def _poses(plan: RigPlan) -> str:
     head += ["roll [deg]", "aim azimuth [deg]", "aim elevation [deg]"]
     head += ["standoff to centre [mm]", "sharp [mm]", "pixels"]
     head += ["target lit or measured", "by it alone"]
+    nearest = "".join(f" {line.strip()}." for line in gap_lines(plan))
     note = (
         f"In the axes of the mesh file; up is {axis_name(up)}. Pan and azimuth count "
         f"about it, tilt and elevation from the horizon; roll is clockwise as the "
-        f"device looks. The middle of the image aims elsewhere than the housing where "
-        f"the lens is shifted.{''.join(f' {line.strip()}.' for line in gap_lines(plan))}"
+        f"device looks. The middle of the image aims elsewhere than the housing "
+        f"where the lens is shifted.{nearest}"
     )
     return table("Devices and their poses", head, rows, note)
 

@@ -7,9 +7,13 @@ Cell = str | int | float | None
 
 
 def element(name: str, content: str, **attributes: str) -> str:
-    """Return an element around markup; attributes are escaped, `class_` is class."""
+    """Return an element around markup; attributes are escaped.
+
+    `class_` becomes class, `aria_label` aria-label.
+    """
     given = "".join(
-        f' {key.rstrip("_")}="{escape(value)}"' for key, value in attributes.items()
+        f' {key.rstrip("_").replace("_", "-")}="{escape(value)}"'
+        for key, value in attributes.items()
     )
     return f"<{name}{given}>{content}</{name}>"
 
@@ -38,7 +42,7 @@ def table(
     scrolled = element(
         "div", whole, class_="scroll", tabindex="0", role="region", aria_label=caption
     )
-    return scrolled.replace("aria_label", "aria-label", 1) + below
+    return element("div", scrolled + below, class_="entry")
 
 
 def _row(cells: Sequence[Cell]) -> str:

@@ -22,7 +22,7 @@ from .per_face import centroids, per_face
 from .verdict import verdict
 from .wall_sheet import wall_sheet
 
-NAME = "report.html"
+PAGE = "report.html"
 _GENERATOR = b'<meta name="generator" content="ringrig report">'
 _NO_CLOUD = (
     " Measured errors are in the report that a checked run writes: the plan's files "
@@ -30,7 +30,7 @@ _NO_CLOUD = (
 )
 
 
-def write_report(
+def write_page(
     plan: RigPlan, path: Path, *, threads: int, error_m: Array | None = None
 ) -> None:
     """Write the report of a plan; an old file stays whole until it is complete.
@@ -44,7 +44,7 @@ def write_report(
     Raises:
         OSError: If it can't be written.
     """
-    content = report_page(plan, threads=threads, error_m=error_m).encode()
+    content = page_of(plan, threads=threads, error_m=error_m).encode()
     write_atomically(path, lambda file: file.write(content))
 
 
@@ -61,7 +61,7 @@ def error_by_face(faces: Ints, distances: Array, n_faces: int) -> Array:
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
-def is_report(path: Path) -> bool:
+def is_page(path: Path) -> bool:
     """Return whether a file is a report that was written here."""
     if not path.is_file():
         return False
@@ -69,8 +69,8 @@ def is_report(path: Path) -> bool:
         return _GENERATOR in file.read(4096)
 
 
-def report_page(plan: RigPlan, *, threads: int, error_m: Array | None = None) -> str:
-    """Return the page; arguments as of `write_report`."""
+def page_of(plan: RigPlan, *, threads: int, error_m: Array | None = None) -> str:
+    """Return the page; arguments as of `write_page`."""
     samples = centroids(plan)
     facts = per_face(plan, samples, threads=threads)
     told, payload = viewer_facts(plan, samples, facts, error_m)
@@ -101,7 +101,9 @@ def report_page(plan: RigPlan, *, threads: int, error_m: Array | None = None) ->
 
 
 def _resource(name: str) -> str:
-    return files(__package__).joinpath(name).read_text(encoding="utf-8").strip()
+    return (
+        files("planning.report.page").joinpath(name).read_text(encoding="utf-8").strip()
+    )
 
 
 def _hash(content: str) -> str:

@@ -1,6 +1,7 @@
 """What a plan does at the centroid of every face, by the audit's own predicates."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,18 +98,15 @@ def per_face(plan: RigPlan, samples: AuditSamples, *, threads: int) -> PerFace:
         threads,
     )
 
-    def joined(name: str) -> NDArray[np.generic]:
+    def joined(name: str) -> NDArray[Any]:
         return np.concatenate([getattr(part, name) for part in parts], axis=-1)
 
     terms = {
         name: np.concatenate([part.terms[name] for part in parts])
         for name in parts[0].terms
     }
-    return PerFace(
-        *map(joined, ("light", "sight", "pairs", "failing", "best", "sigma")),
-        terms,
-        joined("angle"),
-    )
+    names = ("light", "sight", "pairs", "failing", "best", "sigma", "angle")
+    return PerFace(**{name: joined(name) for name in names}, terms=terms)
 
 
 def _of_chunk(
@@ -143,9 +141,7 @@ def _of_chunk(
             fails = np.flatnonzero(passed < len(holds))
             failing[p, c, both[fails]] = figures[passed[fails], fails]
             total = deviation(errors)
-            better = np.flatnonzero(
-                (passed == len(holds)) & (total < least[both])
-            )
+            better = np.flatnonzero((passed == len(holds)) & (total < least[both]))
             rows = both[better]
             least[rows], best[rows] = total[better], p * n_c + c
             for name, values in errors.items():

@@ -40,14 +40,19 @@ def headline(plan: RigPlan) -> str:
     )
     target = {"dominant": "dominant regions", "surface": "whole surface"}
     sigma = plan.coverage.sigma
-    exact = "" if sigma is None else (
-        f" Points are predicted with a standard deviation of {1e3 * sigma.median_m:.3f} "
-        f"mm (median), 95 % within {1e3 * sigma.p95_m:.3f} mm."
+    exact = (
+        ""
+        if sigma is None
+        else (
+            f" Points are predicted with a standard deviation of "
+            f"{1e3 * sigma.median_m:.3f} mm (median), 95 % within "
+            f"{1e3 * sigma.p95_m:.3f} mm."
+        )
     )
     return (
-        f"{devices} with {document.rig.light} light (rig {document.rig.name!r}) measure "
-        f"{percent(areas.measured_m2 / max(areas.area_m2, 1e-300))} of the target, the "
-        f"{target[plan.requirements.target]}.{exact}"
+        f"{devices} with {document.rig.light} light (rig {document.rig.name!r}) "
+        f"measure {percent(areas.measured_m2 / max(areas.area_m2, 1e-300))} of the "
+        f"target, the {target[plan.requirements.target]}.{exact}"
     )
 
 
@@ -86,7 +91,12 @@ def _rows(plan: RigPlan) -> Iterator[tuple[str, str, str, str]]:
         ),
     ):
         share = part / whole if whole > 0.0 else 0.0
-        yield what, f"at least {percent(least)}", percent(share), _judged(share >= least)
+        yield (
+            what,
+            f"at least {percent(least)}",
+            percent(share),
+            _judged(share >= least),
+        )
     if asked.region_coverage and (large := plan.large_regions):
         below = sum(
             region.coverage is not None and region.coverage.floor == "missed"

@@ -23,9 +23,11 @@ from planning.scene.placed_bodies import kind_of
 from .markup import element
 
 # Of a view: its side, what numbers take of it, and the height of a number [user units].
-_SIDE, _MARGIN, _TEXT = 420.0, 70.0, 9.5
+_SIDE, _MARGIN, _TEXT = 420.0, 76.0, 11.0
+# Room about all that is drawn, for names.
+_INSET = 16.0
 # Numbers stand at least so far apart.
-_APART = 12.0
+_APART = 13.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,21 +55,27 @@ def wall_sheet(plan: RigPlan) -> str:
     centre = np.array(plan.requirements.workspace.centre)
     shapes = _shapes(plan)
     # One scale for all three: a length is the same on each.
-    half = max(
-        float(np.abs(view.flat(points - centre)).max())
-        for view in views
-        for _, _, points in shapes
-    )
+    widest = max(float(np.ptp(_bounds(view, shapes), axis=0).max()) for view in views)
+    per_mm = (_SIDE - _MARGIN - 2.0 * _INSET) / widest
     drawings = "".join(
-        element("figure", _drawn(view, shapes, centre, 1.06 * half)) for view in views
+        element("figure", _drawn(view, shapes, centre, per_mm)) for view in views
     )
     x, y, z = 1e3 * centre + 0.0
+    size = " x ".join(
+        f"{side:.1f}" for side in 1e3 * np.ptp(plan.surface.mesh.bounds, 0)
+    )
     note = (
         f"Numbers are millimetres from the object's centre, which is at {x:.1f}, "
-        f"{y:.1f}, {z:.1f} in the axes of the mesh file. All three views have one "
-        f"scale; the bar tells it."
+        f"{y:.1f}, {z:.1f} in the axes of the mesh file; the object is {size} mm along "
+        f"x, y and z. All three views have one scale; the bar tells it."
     )
     return drawings + element("p", escape(note), class_="small")
+
+
+def _bounds(view: _View, shapes: Sequence[tuple[str, str, Array]]) -> Array:
+    """Least and largest places of all shapes in a view [mm], (2, 2)."""
+    flat = view.flat(np.concatenate([points for _, _, points in shapes]))
+    return np.array([flat.min(axis=0), flat.max(axis=0)])
 
 
 def _shapes(plan: RigPlan) -> list[tuple[str, str, Array]]:
@@ -82,16 +90,16 @@ def _shapes(plan: RigPlan) -> list[tuple[str, str, Array]]:
 
 
 def _drawn(
-    view: _View, shapes: Sequence[tuple[str, str, Array]], centre: Array, half_mm: float
+    view: _View, shapes: Sequence[tuple[str, str, Array]], centre: Array, per_mm: float
 ) -> str:
-    per_mm = (_SIDE - _MARGIN) / (2.0 * half_mm)
-    middle = np.array([_MARGIN + 0.5 * (_SIDE - _MARGIN), 0.5 * (_SIDE - _MARGIN)])
+    middle = np.array([0.5 * (_SIDE + _MARGIN), 0.5 * (_SIDE - _MARGIN)])
+    about = _bounds(view, shapes).mean(axis=0)
 
     def placed(points: Array) -> Array:
-        return middle + per_mm * view.flat(points - centre) * [1.0, -1.0]
+        return middle + per_mm * (view.flat(points) - about) * [1.0, -1.0]
 
     edge = _SIDE - _MARGIN
-    (x, y), parts = middle, list[str]()
+    (x, y), parts = placed(centre[None])[0], list[str]()
     for ends in ((_MARGIN, y, _SIDE, y), (x, 0.0, x, edge)):
         parts.append(_line("axis", *ends))
     spots: dict[str, Array] = {}
@@ -105,7 +113,8 @@ def _drawn(
     at = {name: placed(spot[None])[0] for name, spot in spots.items()}
     for name, (a, b) in at.items():
         parts.append(f'<circle class="origin" cx="{a:.1f}" cy="{b:.1f}" r="2"/>')
-        parts.append(_text("name", a + 5.0, b - 5.0, name))
+        aside = a > _SIDE - 2.0 * _INSET
+        parts.append(_text("name end" if aside else "name", a, b - 5.0, name))
     flat = {name: view.flat((spot - centre)[None])[0] for name, spot in spots.items()}
     parts += _ordinates(at, flat, 0)
     parts += _ordinates(at, flat, 1)
@@ -153,11 +162,10 @@ def _spread(places: Sequence[float], low: float, high: float) -> list[float]:
 
 
 def _scale_bar(per_mm: float) -> str:
-    length = round_length(0.2 * _SIDE / per_mm)
-    right, y = _SIDE - 8.0, _SIDE - 6.0
-    left = right - length * per_mm
-    bar = _line("bar", left, y, right, y)
-    return bar + _text("scale", right, y - 4.0, f"{length:g} mm")
+    length = round_length(0.14 * _SIDE / per_mm)
+    left, y = 6.0, _SIDE - 6.0
+    bar = _line("bar", left, y, left + length * per_mm, y)
+    return bar + _text("scale", left, y - 4.0, f"{length:g} mm")
 
 
 def _hull(flat: Array) -> Array:

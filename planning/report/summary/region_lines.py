@@ -24,7 +24,9 @@ _FLAT = 1e-3
 
 def region_words(plan: RigPlan, region: RegionRecord) -> str:
     """Return which region it is: number, size, where it lies and where it faces."""
-    return f"region {region.id} ({area_words(region.area_m2)}{region_place(plan, region)})"
+    return (
+        f"region {region.id} ({area_words(region.area_m2)}{region_place(plan, region)})"
+    )
 
 
 def region_lines(plan: RigPlan) -> list[str]:
@@ -83,7 +85,9 @@ def region_table(plan: RigPlan) -> list[str]:
         head += f"{np.degrees(region.cone_angle):11.0f}  "
         areas = region.coverage
         if areas is None or not areas.samples:
-            lines.append(f"{head}not sampled{region_place(plan, region).replace(',', '', 1)}")
+            lines.append(
+                f"{head}not sampled{region_place(plan, region).replace(',', '', 1)}"
+            )
             continue
         lit, measured = _shares(areas)
         reach = percent(areas.reachable_by_projectors_m2 / region.area_m2)

@@ -74,9 +74,9 @@ export function classLegend(title, classes) {
     .map(({ words, colour, share }) => {
       const patch = element("span", { className: "patch" });
       patch.style.background = `#${colour}`;
-      return element("li", {}, patch, `${words}: ${percent(share)} of the surface`);
+      return element("li", {}, patch, `${percent(share)} ${words}`);
     });
-  byId("legend").replaceChildren(element("h3", { textContent: title }), element("ul", {}, ...rows));
+  byId("legend").replaceChildren(element("h3", { textContent: `${title}, shares of the surface` }), element("ul", {}, ...rows));
 }
 
 function scaleLegend(about) {

@@ -118,7 +118,7 @@ export function whyNoPair(cause, value, limits) {
   const plain = (x) => x.toPrecision(3);
   switch (cause) {
     case "sigma":
-      return `sigma ${against(value, limit, (x) => mm(x, 3), true)}; --accuracy ${(1e3 * Math.max(value, limit) * 1.005).toPrecision(3)} would do`;
+      return `off by ${against(value, limit, (x) => mm(x, 3), true)}; --accuracy ${(1e3 * Math.max(value, limit) * 1.005).toPrecision(3)} would do`;
     case "conditioning":
       return `|r.m| ${against(value, limit, plain, false)}, on a blind curve; limits.min_conditioning = ${(Math.floor(100 * Math.min(value, limit)) / 100).toFixed(2)} would do`;
     case "pitch":

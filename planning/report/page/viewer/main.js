@@ -6,7 +6,7 @@ import { Devices, zonesAndObstacles } from "./devices.js";
 import { byId, element } from "./dom.js";
 import { Eye } from "./eyes.js";
 import { Layers } from "./layers.js";
-import { Measure } from "./measure.js";
+import { dots, Measure } from "./measure.js";
 import { Panel } from "./panel.js";
 import { corners, unpack } from "./payload.js";
 import { Picking } from "./picking.js";
@@ -35,6 +35,10 @@ async function start() {
   const measure = new Measure(stage);
   const picking = new Picking(stage, surface);
 
+  const mark = dots(new THREE.BufferGeometry());
+  mark.frustumCulled = false;
+  stage.scene.add(mark);
+
   const isOn = (name) => byId(`show-${name}`)?.checked ?? false;
   const rings = projectors.map((p) => check("rings-of", `rings-${p.id}`, p.id, false));
 
@@ -55,6 +59,7 @@ async function start() {
   function choose(face, point) {
     if (!(face >= 0 && face < surface.count)) return;
     surface.uniforms.chosen.value = face;
+    mark.geometry.setFromPoints([point]);
     if (measure.active) measure.add(point);
     panel.show(face);
     stage.redraw();

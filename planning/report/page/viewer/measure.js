@@ -4,15 +4,21 @@ import * as THREE from "three";
 
 import { byId, mm } from "./dom.js";
 
+const LOOK = { color: 0xff00cc, depthTest: false };
+
+// Dots that nothing hides, at points of a geometry.
+export function dots(geometry) {
+  return new THREE.Points(geometry, new THREE.PointsMaterial({ ...LOOK, size: 9, sizeAttenuation: false }));
+}
+
 export class Measure {
   constructor(stage) {
     this.stage = stage;
     this.points = [];
     const geometry = new THREE.BufferGeometry().setFromPoints([new THREE.Vector3(), new THREE.Vector3()]);
     // Seen through the surface: a distance often runs inside it.
-    const look = { color: 0xff00cc, depthTest: false };
-    this.line = new THREE.Line(geometry, new THREE.LineBasicMaterial(look));
-    this.ends = new THREE.Points(geometry, new THREE.PointsMaterial({ ...look, size: 9, sizeAttenuation: false }));
+    this.line = new THREE.Line(geometry, new THREE.LineBasicMaterial(LOOK));
+    this.ends = dots(geometry);
     for (const part of [this.line, this.ends]) {
       part.visible = false;
       part.frustumCulled = false;
