@@ -143,7 +143,7 @@ export class Devices {
   }
 }
 
-export function zonesAndObstacles(facts, cornersOf) {
+export function zonesAndObstacles(facts, meshOf) {
   const [zones, obstacles] = [new THREE.Group(), new THREE.Group()];
   for (const { kind, middle, axes, half } of facts.zones) {
     const shape = new THREE.EdgesGeometry(new THREE.BoxGeometry(...half.map((h) => 2 * h)));
@@ -155,7 +155,10 @@ export function zonesAndObstacles(facts, cornersOf) {
   }
   for (const { array, low, side } of facts.obstacles) {
     const geometry = new THREE.BufferGeometry();
-    geometry.setAttribute("position", new THREE.BufferAttribute(cornersOf(array), 3, true));
+    const { places, faces } = meshOf(array);
+    const along = (columns, kind) => kind.from({ length: 3 * columns[0].length }, (_, k) => columns[k % 3][Math.floor(k / 3)]);
+    geometry.setAttribute("position", new THREE.BufferAttribute(along(places, Uint16Array), 3, true));
+    geometry.setIndex(new THREE.BufferAttribute(along(faces, Uint32Array), 1));
     const fill = new THREE.MeshBasicMaterial({ color: 0x8a7a68, transparent: true, opacity: 0.35, side: THREE.DoubleSide });
     const solid = new THREE.Mesh(geometry, fill);
     solid.add(new THREE.LineSegments(new THREE.EdgesGeometry(geometry, 30), new THREE.LineBasicMaterial({ color: 0x605040 })));

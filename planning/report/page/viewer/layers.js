@@ -54,8 +54,7 @@ export class Layers {
   show() {
     const { about } = this;
     const table = tableOf(about);
-    const codes = this.codes(about.id);
-    this.surface.paint((face) => table[codes[face]] ?? BLANK);
+    this.surface.paint(this.codes(about.id), table, BLANK);
     if (about.kind === "scale") scaleLegend(about);
     else classLegend(about.label, about.classes);
   }

@@ -16,57 +16,65 @@ async function inflated(bytes) {
   return new Uint8Array(await new Response(open).arrayBuffer());
 }
 
-// One column: its byte planes put together, and steps added up.
+// One column: its byte planes put together, and steps added up. Without either it is
+// the bytes themselves.
 function column({ bytes, n, delta }, raw, start) {
+  if (bytes === 1 && !delta) return raw.subarray(start, start + n);
   const planes = delta ? bytes + 1 : bytes;
+  const whole = bytes === 4 ? new Float64Array(n) : new Uint32Array(n);
+  for (let p = 0; p < planes; p++) {
+    const [scale, from] = [256 ** p, start + p * n];
+    for (let i = 0; i < n; i++) if (raw[from + i]) whole[i] += raw[from + i] * scale;
+  }
   const values = new KINDS[bytes](n);
   let last = 0;
   for (let i = 0; i < n; i++) {
-    let value = 0;
-    for (let p = planes - 1; p >= 0; p--) value = value * 256 + raw[start + p * n + i];
-    if (delta) {
-      last += value % 2 ? -(value + 1) / 2 : value / 2;
-      value = last;
-    }
-    values[i] = value;
+    const value = whole[i];
+    if (!delta) values[i] = value;
+    else values[i] = last += value % 2 ? -(value + 1) / 2 : value / 2;
   }
-  return { values, next: start + planes * n };
+  return values;
 }
 
-// Returns a map of arrays; those of several columns are lists of columns.
-export async function unpack(text, entries) {
-  const raw = await inflated(bytesOf(text.trim()));
-  const arrays = new Map();
-  let start = 0;
-  for (const entry of entries) {
-    const columns = [];
-    for (let c = 0; c < entry.columns; c++) {
-      const { values, next } = column(entry, raw, start);
-      columns.push(values);
-      start = next;
+// The arrays of a page by their names: lists of columns, each undone when first asked for.
+class Arrays {
+  constructor(raw, entries) {
+    this.raw = raw;
+    this.known = new Map();
+    this.entries = new Map();
+    let start = 0;
+    for (const entry of entries) {
+      const length = entry.n * (entry.delta ? entry.bytes + 1 : entry.bytes);
+      this.entries.set(entry.name, { ...entry, start, length });
+      start += entry.columns * length;
     }
-    arrays.set(entry.name, columns);
   }
-  return arrays;
+
+  get(name) {
+    if (!this.known.has(name)) {
+      const entry = this.entries.get(name);
+      const at = Array.from({ length: entry.columns }, (_, c) => entry.start + c * entry.length);
+      this.known.set(name, at.map((start) => column(entry, this.raw, start)));
+    }
+    return this.known.get(name);
+  }
+}
+
+export async function unpack(text, entries) {
+  return new Arrays(await inflated(bytesOf(text.trim())), entries);
 }
 
 const step = (value) => (value % 2 ? -(value + 1) / 2 : value / 2);
 
-// Corners of all faces of a mesh, one after the other: 16-bit places in its box.
-export function corners(arrays, name) {
-  const [x, y, z] = arrays.get(`${name}.places`);
+// A mesh: 16-bit places of its vertices in its box, and the three vertices of each face.
+export function meshOf(arrays, name) {
+  const places = arrays.get(`${name}.places`);
   const [first] = arrays.get(`${name}.first`);
-  const [second, third] = arrays.get(`${name}.others`);
-  const places = new Uint16Array(9 * first.length);
-  for (let f = 0, k = 0; f < first.length; f++) {
-    const a = first[f];
-    for (const v of [a, a + step(second[f]), a + step(third[f])]) {
-      places[k++] = x[v];
-      places[k++] = y[v];
-      places[k++] = z[v];
-    }
-  }
-  return places;
+  const faces = [first, ...arrays.get(`${name}.others`).map((column) => new Uint32Array(column.length))];
+  arrays.get(`${name}.others`).forEach((column, k) => {
+    for (let f = 0; f < first.length; f++) faces[k + 1][f] = first[f] + step(column[f]);
+  });
+  return { places, faces };
 }
 
 export function half(bits) {

@@ -19,7 +19,7 @@ export class Picking {
     const ray = rayThrough(stage.camera, ndc);
     const face = this.number(ndc, view);
     if (face < 0) return null;
-    const [a] = surface.corners(face);
+    const [a] = surface.triangle(face);
     const plane = new THREE.Plane().setFromNormalAndCoplanarPoint(surface.normal(face), a);
     const point = ray.intersectPlane(plane, new THREE.Vector3());
     return { face, point: point ?? surface.centroid(face) };

@@ -60,8 +60,9 @@ export class Sequence {
       codes[f] = code;
       kinds[code] += areas[f];
     }
-    const shades = CLASSES.map(({ colour }) => [0, 2, 4].map((k) => parseInt(colour.slice(k, k + 2), 16)));
-    surface.paint((f) => shades[2 - codes[f]]);
+    const rgb = (hex) => [0, 2, 4].map((k) => parseInt(hex.slice(k, k + 2), 16));
+    const shades = Object.fromEntries(CLASSES.map(({ code, colour }) => [code, rgb(colour)]));
+    surface.paint(codes, shades, shades[0]);
     classLegend(`Exposure: ${on.join(" + ")}`, CLASSES.map((row) => ({ ...row, share: kinds[row.code] / whole })));
     return { cameras: cameras.map((camera) => camera.id), shares: [...totals].map((total) => total / whole) };
   }

@@ -9,10 +9,10 @@ const TURN = 0.006;
 const STEP = 0.08;
 
 export class Stage {
-  constructor(canvas, centre, up, places) {
+  constructor(canvas, antialias, centre, up, places) {
     const reach = Math.max(...places.map((p) => p.distanceTo(centre)));
     this.canvas = canvas;
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias });
     this.renderer.outputColorSpace = THREE.LinearSRGBColorSpace;
     this.scene = new THREE.Scene();
     this.free = new THREE.PerspectiveCamera(35, 1, 0.01 * reach, 60 * reach);

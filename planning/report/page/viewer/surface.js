@@ -1,4 +1,6 @@
 // The measured surface: one colour a face from a texture, and rings drawn by the pixel.
+// Every face owns the last of its three vertices, whose number says which face it is: a
+// million faces are drawn with a million vertices.
 
 import * as THREE from "three";
 
@@ -9,7 +11,7 @@ out vec3 vWorld;
 out vec3 vView;
 flat out int vFace;
 void main() {
-  vFace = gl_VertexID / 3;
+  vFace = gl_VertexID;
   vec4 world = modelMatrix * vec4(position, 1.0);
   vec4 view = viewMatrix * world;
   vWorld = world.xyz;
@@ -79,11 +81,47 @@ function texture(array, format, type, internal) {
   return made;
 }
 
+function owned({ places, faces }) {
+  const [x, y, z] = places;
+  const count = faces[0].length;
+  const owner = new Int32Array(x.length).fill(-1);
+  const turn = new Uint8Array(count);
+  const last = new Uint32Array(count + x.length);
+  let used = count;
+  for (let f = 0; f < count; f++) {
+    let k = 0;
+    while (k < 2 && owner[faces[k][f]] >= 0) k++;
+    turn[f] = k;
+    last[f] = faces[k][f];
+    owner[last[f]] = f;
+  }
+  const index = new Uint32Array(3 * count);
+  const copy = (v) => {
+    if (owner[v] < 0) {
+      last[used] = v;
+      owner[v] = used++;
+    }
+    return owner[v];
+  };
+  for (let f = 0; f < count; f++) {
+    index[3 * f] = copy(faces[(turn[f] + 1) % 3][f]);
+    index[3 * f + 1] = copy(faces[(turn[f] + 2) % 3][f]);
+    index[3 * f + 2] = f;
+  }
+  // Four numbers a vertex: three would have to be spread for the graphics card.
+  const corners = new Uint16Array(4 * used);
+  for (let k = 0; k < used; k++) {
+    corners[4 * k] = x[last[k]];
+    corners[4 * k + 1] = y[last[k]];
+    corners[4 * k + 2] = z[last[k]];
+  }
+  return { index, corners };
+}
+
 export class Surface {
-  constructor(places, box, projectors, light) {
-    this.count = places.length / 9;
-    this.places = places;
-    this.box = box;
+  constructor(mesh, box, projectors, light) {
+    this.count = mesh.faces[0].length;
+    Object.assign(this, owned(mesh), { box });
     const size = WIDTH * Math.ceil(this.count / WIDTH);
     this.colours = new Uint8Array(4 * size).fill(255);
     const mask = new Uint32Array(size);
@@ -92,7 +130,8 @@ export class Surface {
       for (let f = 0; f < this.count; f++) if (steps[f] === most) mask[f] |= 1 << p;
     });
     const geometry = new THREE.BufferGeometry();
-    geometry.setAttribute("position", new THREE.BufferAttribute(places, 3, true));
+    geometry.setAttribute("position", new THREE.BufferAttribute(this.corners, 4, true));
+    geometry.setIndex(new THREE.BufferAttribute(this.index, 1));
     geometry.boundingSphere = new THREE.Sphere(new THREE.Vector3(0.5, 0.5, 0.5), 1);
     const defines = { COUNT: Math.max(projectors.length, 1) };
     this.texture = texture(this.colours, THREE.RGBAFormat, THREE.UnsignedByteType);
@@ -116,45 +155,50 @@ export class Surface {
     this.mesh.frustumCulled = false;
   }
 
-  // Gives every face the colour that a function returns, as [red, green, blue].
-  paint(colourOf) {
+  // Gives every face the colour of its code, as [red, green, blue]; others are blank.
+  paint(codes, colours, blank) {
+    const table = new Map(Object.entries(colours).map(([code, rgb]) => [Number(code), rgb]));
+    const shades = new Uint8Array(3 * 65536);
+    for (let code = 0; code < 65536; code++) shades.set(table.get(code) ?? blank, 3 * code);
     for (let f = 0; f < this.count; f++) {
-      const [r, g, b] = colourOf(f);
-      this.colours[4 * f] = r;
-      this.colours[4 * f + 1] = g;
-      this.colours[4 * f + 2] = b;
+      const from = 3 * codes[f];
+      this.colours[4 * f] = shades[from];
+      this.colours[4 * f + 1] = shades[from + 1];
+      this.colours[4 * f + 2] = shades[from + 2];
     }
     this.texture.needsUpdate = true;
   }
 
   // Corners of a face in the world.
-  corners(face) {
+  triangle(face) {
+    const { corners, box } = this;
     return [0, 1, 2].map((k) => {
-      const at = 9 * face + 3 * k;
-      const [x, y, z] = [0, 1, 2].map(
-        (i) => this.box.low[i] + (this.box.side[i] * this.places[at + i]) / 65535,
-      );
-      return new THREE.Vector3(x, y, z);
+      const at = 4 * this.index[3 * face + k];
+      return new THREE.Vector3(...[0, 1, 2].map((i) => box.low[i] + (box.side[i] * corners[at + i]) / 65535));
     });
   }
 
   centroid(face) {
-    const [a, b, c] = this.corners(face);
+    const [a, b, c] = this.triangle(face);
     return a.add(b).add(c).divideScalar(3);
   }
 
   normal(face) {
-    const [a, b, c] = this.corners(face);
+    const [a, b, c] = this.triangle(face);
     return b.sub(a).cross(c.sub(a)).normalize();
   }
 
+  // Of every face [m²], in a loop without objects: there may be a million.
   get areas() {
-    if (!this.known) {
-      this.known = new Float32Array(this.count);
-      for (let f = 0; f < this.count; f++) {
-        const [a, b, c] = this.corners(f);
-        this.known[f] = 0.5 * b.sub(a).cross(c.sub(a)).length();
-      }
+    if (this.known) return this.known;
+    const [sx, sy, sz] = this.box.side.map((side) => side / 65535);
+    const { index, corners: p } = this;
+    this.known = new Float32Array(this.count);
+    for (let f = 0; f < this.count; f++) {
+      const [i, j, k] = [4 * index[3 * f], 4 * index[3 * f + 1], 4 * index[3 * f + 2]];
+      const [ax, ay, az] = [sx * (p[j] - p[i]), sy * (p[j + 1] - p[i + 1]), sz * (p[j + 2] - p[i + 2])];
+      const [bx, by, bz] = [sx * (p[k] - p[i]), sy * (p[k + 1] - p[i + 1]), sz * (p[k + 2] - p[i + 2])];
+      this.known[f] = 0.5 * Math.hypot(ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx);
     }
     return this.known;
   }
