@@ -125,6 +125,12 @@ def test_the_same_command_gives_the_same_files_whatever_the_threads(runs):
     )
     cost = json.loads((folder / "plan1" / "plan.json").read_text())["cost"]
     assert len([name for name in drawn if name.endswith(".png")]) == cost["n_frames"]
+    # Points were measured in the first run alone.
+    pages = [(folder / f"plan{n}" / "report.html").read_text() for n in (1, 2)]
+    assert ["measured error, outside positive" in page for page in pages] == [
+        True,
+        False,
+    ]
     for name in ("surface.npz", "rig.png", *drawn):
         one, two = ((folder / f"plan{n}" / name).read_bytes() for n in (1, 2))
         assert one == two, name

@@ -80,9 +80,9 @@ class Browser:
         )
 
     def log(self) -> list[str]:
-        """Return what the console said since the last call, faults alone."""
+        """Return the errors that the console had since the last call."""
         entries = self._ask("POST", "/se/log", {"type": "browser"})
-        return [e["message"] for e in entries if e["level"] in ("SEVERE", "WARNING")]
+        return [e["message"] for e in entries if e["level"] == "SEVERE"]
 
     def picture(self) -> bytes:
         return base64.b64decode(self._ask("GET", "/screenshot"))

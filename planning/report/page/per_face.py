@@ -73,7 +73,9 @@ class PerFace:
     def cause(self, samples: AuditSamples) -> NDArray[np.int64]:
         """Return the cause of each face as the audit names it, -1 where measured."""
         unused = np.zeros(self.light.shape)
-        return Recomputed(samples, self.light, unused, self.pairs).cause
+        return Recomputed(samples, self.light, unused, self.pairs).cause.astype(
+            np.int64
+        )
 
 
 def centroids(plan: RigPlan) -> AuditSamples:
