@@ -10,6 +10,8 @@ from planning.report.summary.shortfall import shortfalls
 
 from .markup import element, paragraphs, table
 
+# So many misses are told at once.
+_TOLD = 3
 _MET, _MISSED, _NOT_CHECKED = "met", "NOT MET", "NOT CHECKED"
 
 
@@ -24,7 +26,10 @@ def verdict(plan: RigPlan) -> str:
     if plan.document.truncated:
         words += "; TRUNCATED: the run was cut"
     head = element("p", words, class_=f"verdict {kind}", id="verdict")
-    why = paragraphs(missed, class_="why")
+    why = paragraphs(missed[:_TOLD], class_="why")
+    if more := missed[_TOLD:]:
+        title = element("summary", f"{len(more)} more")
+        why += element("details", title + paragraphs(more, class_="why"))
     rows = list(_rows(plan))
     short = element("p", escape(headline(plan)))
     columns = ("what", "asked", "is", "verdict")
