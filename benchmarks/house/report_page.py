@@ -3,7 +3,7 @@
     python -m benchmarks.house.report_page face-plan [--faces 1050000]
 
 Of a plan's own surface, and of a sample head of about a million faces under the same
-devices. Pictures are drawn by Chromium's software renderer: no graphics card takes part.
+devices. Pictures are drawn by Chromium's software renderer, without a graphics card.
 """
 
 import argparse
@@ -22,7 +22,7 @@ from planning.model.plan import RigPlan
 from planning.report.page.page import write_page
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "tests"))
-from support import browser  # noqa: E402
+from support import browser
 
 _RUNS = 3
 

@@ -11,7 +11,7 @@ from PIL import Image
 from .job import ROOT, Job
 
 sys.path.append(str(ROOT / "tests"))
-from support import browser  # noqa: E402
+from support import browser
 
 _WINDOW = (1180, 980)
 
