@@ -25,7 +25,7 @@ from planning.rig.rig import Rig
 from planning.rig.wishes import AccuracyOf, TargetName, Wishes
 from planning.scene.interest import Select, Weight
 from planning.scene.ranges.ranged_body import RangedBody
-from planning.verify.verification import verify_plan
+from planning.verify.verification import Verification, verify_plan
 
 from .steps.prepare import prepared, request_of, standing_devices
 from .steps.stages import (
@@ -40,6 +40,7 @@ from .steps.stages import (
 )
 
 Keep = Callable[[RigPlan], None]
+Checked = Callable[[RigPlan, Verification], None]
 # Time kept for writing, in times that writing the first plan took.
 _WRITING = 1.25
 
@@ -71,6 +72,7 @@ def plan_rig(
     progress: Report | bool = False,
     command: Sequence[str] = (),
     keep: Keep | None = None,
+    checked: Checked | None = None,
     fixed: Mounted | None = None,
     on_miss: Literal["raise", "return"] = "raise",
 ) -> RigPlan:
@@ -116,6 +118,7 @@ def plan_rig(
         command: Words of the command line, for the record.
         keep: Receives the plan when it is made and not yet checked; with a time limit
             also the first one, before its poses are improved.
+        checked: Receives it with what the check found.
         fixed: Devices that stay where they are and count, from `read_mounted`.
         on_miss: Whether a plan that misses a requirement is raised with the error, or
             returned.
@@ -166,13 +169,13 @@ def plan_rig(
         planned = _evaluated if evaluates else robustly(_planned)
         plan, partial = planned(request, clock, keep)
         if check and not plan.document.truncated:
-            plan = _checked(plan, partial, clock, keep)
+            plan = _checked(plan, partial, clock, keep, checked)
             if axes_may_help(plan, partial):
                 clock.say("  centred ring axes don't pass the check: free ones")
                 freed = replace(request, axis_wanted="free")
                 other, partial = planned(freed, clock, keep)
                 if not other.document.truncated:
-                    other = _checked(other, partial, clock, keep)
+                    other = _checked(other, partial, clock, keep, checked)
                     plan = plan if missed_by(other, check=True) else other
     missed = missed_by(plan, check=check)
     if missed and on_miss == "raise":
@@ -264,7 +267,11 @@ def _first_plan(request: PlanRequest, clock: Stopwatch) -> PartialPlan:
 
 
 def _checked(
-    plan: RigPlan, partial: PartialPlan, clock: Stopwatch, keep: Keep | None
+    plan: RigPlan,
+    partial: PartialPlan,
+    clock: Stopwatch,
+    keep: Keep | None,
+    checked: Checked | None,
 ) -> RigPlan:
     """Audit the kept plan and reconstruct it from pixels, with foreign code.
 
@@ -284,6 +291,8 @@ def _checked(
         raise InterruptedPlanError(cut) from None
     except TIME_IS_UP:
         return cut
+    if checked is not None:
+        checked(plan, verification)
     check, record = verification.reconstruction, None
     if check is not None:
         false = verification.audit.failures

@@ -16,6 +16,7 @@ from PIL import Image
 from benchmarks.pictures import (
     light_pictures,
     measured_pictures,
+    page_pictures,
     paper_figures,
     paper_pictures,
     triangle_figure,
@@ -42,6 +43,8 @@ PICTURES: dict[str, Callable[[Job], Image.Image]] = {
     "cells": light_pictures.cells,
     "openness": light_pictures.openness,
     "cost": paper_pictures.cost,
+    "report_rig": page_pictures.rig,
+    "report_triangle": page_pictures.triangle,
 }
 
 

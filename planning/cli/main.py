@@ -14,17 +14,19 @@ from click.shell_completion import CompletionItem, get_completion_class
 from planning.cli.declared.calibrate_declared import calibrate
 from planning.cli.declared.evaluate_declared import evaluate
 from planning.cli.declared.export_declared import export
-from planning.cli.declared.other_declared import accept, sample, show, verify
+from planning.cli.declared.other_declared import (
+    accept,
+    report,
+    sample,
+    show,
+    verify,
+)
 from planning.cli.declared.plan_declared import rig_command
 from planning.cli.declared.reconstruct_declared import reconstruct
 from planning.cli.declared.rigs_declared import lens, play, rigs, schema
 from planning.cli.declared.tolerance_declared import tolerance
 
 from .console import stop, stop_signals
-
-_NOT_BUILT = {
-    "report": "writes one self-contained HTML file",
-}
 
 
 class _DefaultGroup(click.Group):
@@ -89,6 +91,7 @@ def commands() -> None:
     plan verify face-plan/plan.json           recomputes every claim, checks again
     plan accept face-plan/plan.json           a maker's figures: ball bars, plates
     plan show face-plan/plan.json             every place in mesh axes, camera by camera
+    plan report face-plan                     one HTML file: rig, causes, tables
     plan tolerance face-plan --mount 2mm,0.2deg
                                               how well devices must be mounted
     plan rigs                                 rigs and devices to plan with; rigs new
@@ -105,7 +108,7 @@ def commands() -> None:
 
 for _command in (
     *(rig_command, evaluate, verify, accept, show, reconstruct, tolerance, export),
-    *(lens, calibrate, play, rigs, schema, sample),
+    *(report, lens, calibrate, play, rigs, schema, sample),
 ):
     commands.add_command(_command)
 
@@ -123,26 +126,6 @@ def completion(shell: str) -> None:
     script = get_completion_class(shell)
     if script is not None:
         click.echo(script(commands, {}, "plan", "_PLAN_COMPLETE").source())
-
-
-def _not_built(name: str, purpose: str) -> None:
-    @commands.command(
-        name,
-        short_help=f"(not built yet) {purpose}",
-        context_settings={
-            "ignore_unknown_options": True,
-            "help_option_names": ["--help"],
-        },
-    )
-    @click.argument("anything", nargs=-1, type=click.UNPROCESSED)
-    def command(anything: tuple[str, ...]) -> None:
-        raise click.UsageError(f"`plan {name}` isn't built yet; it {purpose}")
-
-    command.help = f"Not built yet: {purpose}."
-
-
-for _name, _purpose in _NOT_BUILT.items():
-    _not_built(_name, _purpose)
 
 
 def main() -> None:

@@ -14,6 +14,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from uuid import uuid4
 
+from planning.report.page.page import PAGE, is_page
 from planning.verify.reconstruction.check.cloud_file import is_cloud
 from planning.verify.reconstruction.pattern_files import is_patterns
 
@@ -21,7 +22,7 @@ from .console import stop_signals
 
 # What a run writes, and what of an older plan doesn't stay beside a new one.
 _CLOUDS = ("cloud.ply", "deviation.ply")
-OWNED = ("plan.json", "surface.npz", "rig.png", "patterns", *_CLOUDS)
+OWNED = ("plan.json", "surface.npz", "rig.png", PAGE, "patterns", *_CLOUDS)
 # `renameat2` and `renamex_np` exchange two entries under these flags.
 _EXCHANGE, _SWAP, _HERE = 2, 2, -100
 # What is younger may be what another run is writing just now [s].
@@ -119,6 +120,8 @@ def _is_ours(entry: Path) -> bool:
     """Whether an earlier run wrote an entry of a folder."""
     if entry.name in _CLOUDS:
         return is_cloud(entry)
+    if entry.name == PAGE:
+        return is_page(entry)
     if entry.name == "patterns":
         return is_patterns(entry)
     return entry.name in OWNED

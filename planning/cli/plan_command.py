@@ -54,6 +54,7 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
     path = Path(options["ranges"] or options["meshes"][0])
     result = "plan" if options["max_projectors"] else "evaluation"
     folder = options["output"] or Path(f"{path.name.split('.')[0]}-{result}")
+    threads = options["threads"] or n_threads()
     check, interrupted = not options["no_check"], False
     with writable(folder), progress(quiet=options["quiet"]) as report:
         saved = SavedPlans(folder, report, patterns=not options["no_patterns"])
@@ -67,12 +68,13 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
                 rig,
                 fixed=fixed,
                 select=interest,
-                threads=options["threads"] or n_threads(),
+                threads=threads,
                 check=check,
                 time_limit=clock.remaining,
                 progress=report,
                 command=("plan", *command),
                 keep=saved.keep,
+                checked=saved.checked,
                 **{name: options[name] for name in _ASKED},
             )
         except RequirementError as error:
@@ -80,6 +82,8 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
         except InterruptedPlanError as error:
             plan, interrupted = error.plan, True
         plan = saved.finish(plan, clock)
+        if not options["no_report"] and not interrupted:
+            saved.write_page(plan, clock, threads)
     missed = () if interrupted else missed_by(plan, check=check)
     if options["as_json"]:
         told = {"files": saved.files, "missed": list(missed)}

@@ -3,14 +3,17 @@
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
+from geometry.arrays import Array
 from planning.model.errors import TimeLimitError
 from planning.model.plan import RigPlan
-from planning.model.progress import Report, Stopwatch, untimed
+from planning.model.progress import TIME_IS_UP, Report, Stopwatch, untimed
 from planning.report.drawing.face_colours import face_status
 from planning.report.drawing.picture_view import save_picture
 from planning.report.drawing.rig_picture import draw_rig
+from planning.report.page.page import PAGE, error_by_face, is_page, write_page
 from planning.verify.reconstruction.pattern_files import write_patterns
 from planning.verify.reconstruction.scanner import Scanner
+from planning.verify.verification import Verification
 
 from .output_folder import OWNED, exchanged, uninterrupted
 
@@ -27,6 +30,7 @@ class SavedPlans:
     def __init__(self, folder: Path, report: Report, *, patterns: bool) -> None:
         self._folder, self._report, self._patterns = folder, report, patterns
         self.last: RigPlan | None = None
+        self._errors: dict[str, Array] = {}
 
     @property
     def files(self) -> list[str]:
@@ -43,6 +47,28 @@ class SavedPlans:
         with uninterrupted():
             self._save(plan)
         self._report(f"written to {self._folder}, NOT CHECKED yet")
+
+    def checked(self, plan: RigPlan, verification: Verification) -> None:
+        """Keep what the check measured of each face, for the page."""
+        check = verification.reconstruction
+        if check is not None and check.accuracy is not None:
+            faces, distances = check.accuracy.faces, check.accuracy.distances
+            n_faces = len(plan.surface.mesh.faces)
+            self._errors[plan.digest] = error_by_face(faces, distances, n_faces)
+
+    def write_page(self, plan: RigPlan, clock: Stopwatch, threads: int) -> None:
+        """Write `report.html` beside a plan that stands, where there is time for it."""
+        path = self._folder / PAGE
+        if path.exists() and not is_page(path):
+            self._report(f"{path} isn't of a plan and stays; `plan report -o` writes")
+            return
+        self._report("report")
+        try:
+            with clock.ticking():
+                error_m = self._errors.get(plan.digest)
+                write_page(plan, path, threads=threads, error_m=error_m)
+        except TIME_IS_UP:
+            self._report(f"no time for {path}: `plan report {self._folder}` writes it")
 
     def finish(self, plan: RigPlan, clock: Stopwatch) -> RigPlan:
         """Save how a run ended, and return the plan that stands in the folder.

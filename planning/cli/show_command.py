@@ -1,4 +1,4 @@
-"""What `plan show` does: what the short summary leaves out, of a plan as written."""
+"""What `plan show` and `plan report` do with a plan as written: words, or a page."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
@@ -10,6 +10,7 @@ import numpy as np
 from geometry.parallel import n_threads
 from planning.model.plan import RigPlan
 from planning.model.words import labelled, percent
+from planning.report.page.page import PAGE, is_page, write_page
 from planning.report.summary.sections import SECTIONS
 from planning.verify.audit.devices.camera_figures import (
     CameraFigures,
@@ -66,6 +67,26 @@ def _section(plan: RigPlan, name: str, threads: int | None) -> list[str]:
     figures = camera_figures(plan, threads=threads or n_threads())
     lines = [line for camera in figures for line in _camera_lines(camera)]
     return ["CAMERAS: what each sees of the target, and how well.", *lines, ""]
+
+
+def report_command(options: Mapping[str, Any]) -> int:
+    """Write a plan's page; what isn't a page stays, unless `-o` names it.
+
+    Raises:
+        OSError: If it can't be written.
+    """
+    plan = RigPlan.load(options["plan_file"])
+    path = options["output"] or options["plan_file"].parent / PAGE
+    if options["output"] is None and path.exists() and not is_page(path):
+        raise FileExistsError(f"{path} isn't of a plan; choose another with -o")
+    if not path.parent.is_dir():
+        raise FileNotFoundError(f"{path.parent} is no folder; make it first")
+    write_page(plan, path, threads=options["threads"] or n_threads())
+    if options["as_json"]:
+        print_json({"files": [str(path)]})
+    else:
+        click.echo(f"written to {path}")
+    return 0
 
 
 def _camera_lines(camera: CameraFigures) -> Iterator[str]:

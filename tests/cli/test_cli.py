@@ -128,6 +128,12 @@ def test_the_same_command_gives_the_same_files_whatever_the_threads(runs):
     )
     cost = json.loads((folder / "plan1" / "plan.json").read_text())["cost"]
     assert len([name for name in drawn if name.endswith(".png")]) == cost["n_frames"]
+    # Points were measured in the first run alone.
+    pages = [(folder / f"plan{n}" / "report.html").read_text() for n in (1, 2)]
+    assert ["measured error, outside positive" in page for page in pages] == [
+        True,
+        False,
+    ]
     for name in ("surface.npz", "rig.png", *drawn):
         one, two = ((folder / f"plan{n}" / name).read_bytes() for n in (1, 2))
         assert one == two, name
@@ -306,7 +312,7 @@ def test_a_signal_while_a_plan_is_saved_costs_no_second_saving(
         (["export", "plan.json", "--to", "obj"], 2, "is none of opencv"),
         (["export", "no.json", "--to", "mitsuba"], 3, "no such file"),
         (["verify", "no.json", "--spp", "8"], 2, "--spp goes with --renderer mitsuba"),
-        (["report", "plan.json"], 2, "isn't built yet"),
+        (["report", "plan.json"], 3, "no such file"),
         (["reconstruct", "no.json"], 3, "no such file"),
     ],
 )

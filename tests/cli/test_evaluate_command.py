@@ -43,7 +43,9 @@ def test_a_rig_as_it_stands_has_a_folder_like_a_plans(plan, tmp_path, monkeypatc
     words = ["plate.obj", "--poses", "mounted.csv", "--target", "surface", "--json"]
     # 13 degrees are little for what a calibration leaves.
     words += ["--accuracy", "1"]
-    code, out, _ = plan("evaluate", *words, "--no-check", "--no-patterns")
+    code, out, _ = plan(
+        "evaluate", *words, "--no-check", "--no-patterns", "--no-report"
+    )
     folder = tmp_path / "plate-evaluation"
     assert code == 1
     assert {path.name for path in folder.iterdir()} == {
@@ -60,7 +62,7 @@ def test_a_rig_as_it_stands_has_a_folder_like_a_plans(plan, tmp_path, monkeypatc
     # As good as this light can be: the requirements are what was reached.
     shares = ["--dominant-coverage", "0.3", "--coverage", "0.3"]
     shares += ["--min-reachable", "0.1", "--region-coverage", "0"]
-    shares += ["--no-check", "--no-patterns"]
+    shares += ["--no-check", "--no-patterns", "--no-report"]
     assert plan("evaluate", *words, *shares)[0] == 0
 
 

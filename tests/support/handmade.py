@@ -20,6 +20,8 @@ from geometry.shapes.primitives import sphere
 from planning.model.plan import RigPlan
 from planning.model.surface import Surface
 
+from .bare_plan import bare_plan
+
 LIGHT = (
     "projector_beam",
     "projector_range",
@@ -62,6 +64,23 @@ def make_plan(light: str = "diverging", target: str = "dominant") -> RigPlan:
     document = _document(light, target, surface)
     _claim(document, surface)
     return RigPlan.from_document(document, surface)
+
+
+def unclaimed(light: str = "diverging") -> RigPlan:
+    """Return the same devices and limits in a plan that claims nothing, at once."""
+    surface = _surface(light)
+    document = _document(light, "dominant", surface)
+    parts = (document.pop(key) for key in ("requirements", "projectors", "cameras"))
+    kept = {key: document[key] for key in ("created", "cost", "rig")}
+    plan = bare_plan(*parts, surface, **kept)
+    area = {"area_m2": surface.mesh.area}
+
+    def complete(document: dict[str, Any]) -> None:
+        document["surface"]["curvature_radius_m"] = 0.01
+        document["coverage"]["target"] |= area
+        document["coverage"]["surface"] |= area
+
+    return tampered(plan, complete)
 
 
 def tampered(plan: RigPlan, change: Callable[[dict[str, Any]], object]) -> RigPlan:

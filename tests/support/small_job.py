@@ -47,7 +47,15 @@ def run(mesh: Path, folder: Path, words: Sequence[str] = ()) -> Ended:
     rig.write_text(RIG)
     out = folder / "plan"
     command = ["--mesh", str(mesh), "--max-projectors", "3", "--rig", str(rig)]
-    command += ["--no-check", "--quiet", "--threads", "1", "-o", str(out)]
+    command += [
+        "--no-check",
+        "--no-report",
+        "--quiet",
+        "--threads",
+        "1",
+        "-o",
+        str(out),
+    ]
     # The paper's route takes a third of the time: where a test asks for it.
     command += [] if "--cameras-by" in words else ["--cameras-by", "cover"]
     command += words

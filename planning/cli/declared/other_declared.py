@@ -1,4 +1,4 @@
-"""`plan verify`, `accept`, `show` and `sample`: their options."""
+"""`plan verify`, `accept`, `show`, `report` and `sample`: their options."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -106,6 +106,26 @@ def show(**options: Any) -> None:  # noqa: ANN401
     from planning.cli.show_command import show_command
 
     run(lambda: show_command(options), debug=options["debug"])
+
+
+@click.command()
+@click.argument("plan_file", type=PlanFile(), metavar="DIR[/plan.json]")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Where it goes [default: report.html beside the plan].",
+)
+@threads_option
+@output_options
+def report(**options: Any) -> None:  # noqa: ANN401
+    """Write one HTML file that needs no network: the rig, why triangles aren't
+    measured, tables, and a sheet for the wall.
+    """  # noqa: D205 - click cuts the short help at a blank line
+    from planning.cli.show_command import report_command
+
+    run(lambda: report_command(options), debug=options["debug"])
 
 
 @click.command()

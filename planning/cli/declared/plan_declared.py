@@ -238,6 +238,7 @@ class GroupedCommand(click.Command):
     is_flag=True,
     help="Print all that `plan show --all` does, and not the most important lines.",
 )
+@click.option("--no-report", is_flag=True, help="Write no report.html.")
 @output_options
 def rig_command(**options: Any) -> None:  # noqa: ANN401
     """Plan a rig for a mesh, or for ranges (the default command)."""

@@ -24,7 +24,9 @@ _FLAT = 1e-3
 
 def region_words(plan: RigPlan, region: RegionRecord) -> str:
     """Return which region it is: number, size, where it lies and where it faces."""
-    return f"region {region.id} ({area_words(region.area_m2)}{_place(plan, region)})"
+    return (
+        f"region {region.id} ({area_words(region.area_m2)}{region_place(plan, region)})"
+    )
 
 
 def region_lines(plan: RigPlan) -> list[str]:
@@ -52,7 +54,7 @@ def worst_region(plan: RigPlan) -> str | None:
     if not large:
         return None
     region, areas = min(large, key=lambda pair: min(_shares(pair[1])))
-    where = ",".join(_place(plan, region).split(",")[:3])
+    where = ",".join(region_place(plan, region).split(",")[:3])
     area = area_words(region.area_m2)
     return f"region {region.id} ({area}{where}) {_deed(areas)}"
 
@@ -93,7 +95,9 @@ def region_table(plan: RigPlan) -> list[str]:
         head += f"{np.degrees(region.cone_angle):11.0f}  "
         areas = region.coverage
         if areas is None or not areas.samples:
-            lines.append(f"{head}not sampled{_place(plan, region).replace(',', '', 1)}")
+            lines.append(
+                f"{head}not sampled{region_place(plan, region).replace(',', '', 1)}"
+            )
             continue
         lit, measured = _shares(areas)
         reach = percent(areas.reachable_by_projectors_m2 / region.area_m2)
@@ -103,7 +107,7 @@ def region_table(plan: RigPlan) -> list[str]:
         by = " ".join((*region.lit_by, *areas.measured_by)) or "none"
         lines.append(
             f"{head}{reach:>9} {percent(lit):>7}  {able:>10}  {done:>8}  "
-            f"{floor:<7} {by:<23}{_place(plan, region).replace(',', '', 1)}"
+            f"{floor:<7} {by:<23}{region_place(plan, region).replace(',', '', 1)}"
         )
     return lines
 
@@ -179,7 +183,7 @@ def _deed(areas: RegionCoverage) -> str:
     return f"lit {percent(lit)} and measured {percent(measured)} of what can be"
 
 
-def _place(plan: RigPlan, region: RegionRecord) -> str:
+def region_place(plan: RigPlan, region: RegionRecord) -> str:
     """Height and side on the object, by `up` and the axes of the mesh, after ", "."""
     if region.centre_m is None:
         return ""

@@ -116,16 +116,44 @@ def pair_steps(
 ) -> Steps:
     """Return how many limits of *measurable* lit and seen samples pass, shape (n,)."""
     pair = PairGeometry.of(projector, camera, samples)
+    figures = pair_figures(pair, error_terms(pair, limits), limits)
+    return _passed(*pair_holds(figures, limits))
+
+
+def pair_figures(
+    pair: PairGeometry, terms: dict[str, Array], limits: TriangulationLimits
+) -> Array:
+    """Return what each limit of `PAIR_CAUSES` looks at, (5, n); NaN where unlimited.
+
+    Grey levels between lit and dark, the brightest one, |r.m|, the deviation [m] and
+    the pitch [px].
+    """
     names = NOISE_TERMS if limits.accuracy_of == "noise" else None
-    sigma = deviation(error_terms(pair, limits), names)
-    light, every = limits.light, np.ones(len(samples), dtype=bool)
-    levels = None if light is None else pair.levels(light)
-    return _passed(
-        every if levels is None else levels.contrast >= levels.light.min_contrast,
-        every if levels is None else levels.brightest < 254.5,
-        pair.conditioning >= limits.min_conditioning,
-        sigma <= _or(limits.max_sigma_m, np.inf),
-        pair.pitch >= _or(limits.min_ring_pitch_px, -np.inf),
+    unsaid = np.full(len(pair.points), np.nan)
+    levels = None if limits.light is None else pair.levels(limits.light)
+    return np.array(
+        [
+            unsaid if levels is None else levels.contrast,
+            unsaid if levels is None else levels.brightest,
+            pair.conditioning,
+            deviation(terms, names),
+            pair.pitch,
+        ]
+    )
+
+
+def pair_holds(figures: Array, limits: TriangulationLimits) -> Mask:
+    """Return which limits of `PAIR_CAUSES` those figures keep, (5, n)."""
+    contrast, brightest, conditioning, sigma, pitch = figures
+    light, every = limits.light, np.ones(len(sigma), dtype=bool)
+    return np.array(
+        [
+            every if light is None else contrast >= light.min_contrast,
+            every if light is None else brightest < 254.5,
+            conditioning >= limits.min_conditioning,
+            sigma <= _or(limits.max_sigma_m, np.inf),
+            pitch >= _or(limits.min_ring_pitch_px, -np.inf),
+        ]
     )
 
 

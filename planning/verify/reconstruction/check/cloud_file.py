@@ -23,12 +23,12 @@ _PLY_TYPES = {"<f8": "double", "<f4": "float", "|u1": "uchar"}
 
 # Every seventeenth of the 256 colours of viridis (S. van der Walt, N. Smith, CC0);
 # lightness rises evenly, so that colour blindness loses nothing.
-_VIRIDIS = (
+VIRIDIS = (
     "440154 481a6c 472f7d 414487 39568c 31688e 2a788e 23888e "
     "1f988b 22a884 35b779 54c568 7ad151 a5db36 d2e21b fde725"
 )
 # RdBu of ColorBrewer (C. Brewer, M. Harrower), reversed: safe for colour blindness too.
-_BLUE_TO_RED = "2166ac 4393c3 92c5de d1e5f0 f7f7f7 fddbc7 f4a582 d6604d b2182b"
+BLUE_TO_RED = "2166ac 4393c3 92c5de d1e5f0 f7f7f7 fddbc7 f4a582 d6604d b2182b"
 # Values beyond these quantiles take the colours of the ends.
 _ENDS = (0.02, 0.98)
 _WIDEST = 0.95
@@ -57,14 +57,14 @@ _BY_SIGMA = ColourScale(
     "sigma",
     "standard deviation along the normal",
     "viridis",
-    _VIRIDIS,
+    VIRIDIS,
     ((0.0, "violet"), (0.5, "teal"), (1.0, "yellow")),
 )
 _BY_DEVIATION = ColourScale(
     "deviation",
     "signed distance from the mesh, outside positive",
     "RdBu",
-    _BLUE_TO_RED,
+    BLUE_TO_RED,
     ((0.0, "blue"), (0.5, "white"), (1.0, "red")),
 )
 

@@ -1,0 +1,130 @@
+"""Tables of what stands where: poses, mounts, rings, the sequence and baselines."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from geometry.poses import pan_tilt_roll
+from planning.model.plan import RigPlan
+from planning.model.words import area_words, percent
+from planning.report.summary.coverage_lines import schedule_lines
+from planning.report.summary.device_lines import aim_angles, axis_name, gap_lines
+from planning.rings.acquisition import n_frames
+
+from .markup import table
+
+
+def device_tables(plan: RigPlan) -> Iterator[str]:
+    """Yield the tables of a plan's devices."""
+    yield _poses(plan)
+    yield _mounts(plan)
+    yield _rings(plan)
+    yield _sequence(plan)
+    yield _baselines(plan)
+
+
+def _poses(plan: RigPlan) -> str:
+    space = plan.requirements.workspace
+    centre, up = np.array(space.centre), np.array(space.up)
+    areas = {p.id: (p.lit_area_m2, None) for p in plan.document.projectors}
+    areas |= {c.id: (c.seen_area_m2, c.sole_area_m2) for c in plan.document.cameras}
+    rows: list[list[str]] = []
+    for device in (*plan.projectors, *plan.cameras):
+        pose = device.world_from_device
+        angles = np.degrees(pan_tilt_roll(pose[:3, :3], up))
+        azimuth, elevation, _ = aim_angles(device, up)
+        near, far = device.device.range_m
+        covered, sole = areas[device.id]
+        rows.append(
+            [
+                device.id + (f" ({device.existing})" if device.existing else ""),
+                # Adding 0.0 leaves no -0.0.
+                *(f"{x:.1f}" for x in np.round(1e3 * pose[:3, 3], 1) + 0.0),
+                *(f"{a:.1f}" for a in np.round([*angles, azimuth, elevation], 1) + 0.0),
+                f"{1e3 * np.linalg.norm(pose[:3, 3] - centre):.1f}",
+                f"{1e3 * near:.0f} to {1e3 * far:.0f}",
+                " x ".join(map(str, device.device.resolution)),
+                area_words(covered),
+                "" if sole is None else area_words(sole),
+            ]
+        )
+    head = ["device", "x [mm]", "y [mm]", "z [mm]", "pan [deg]", "tilt [deg]"]
+    head += ["roll [deg]", "aim azimuth [deg]", "aim elevation [deg]"]
+    head += ["standoff to centre [mm]", "sharp [mm]", "pixels"]
+    head += ["target lit or measured", "by it alone"]
+    nearest = "".join(f" {line.strip()}." for line in gap_lines(plan))
+    note = (
+        f"In the axes of the mesh file; up is {axis_name(up)}. Pan and azimuth count "
+        f"about it, tilt and elevation from the horizon; roll is clockwise as the "
+        f"device looks. The middle of the image aims elsewhere than the housing "
+        f"where the lens is shifted.{nearest}"
+    )
+    return table("Devices and their poses", head, rows, note)
+
+
+def _mounts(plan: RigPlan) -> str:
+    rows: list[list[str]] = []
+    for record in (*plan.document.projectors, *plan.document.cameras):
+        if record.world_from_mount is None:
+            continue
+        pose = np.array(record.world_from_mount)
+        place = [f"{x:.1f}" for x in np.round(1e3 * pose[:3, 3], 1) + 0.0]
+        ways = [
+            ", ".join(f"{x:.4f}" for x in np.round(pose[:3, axis], 4) + 0.0)
+            for axis in (2, 0)
+        ]
+        rows.append([record.id, *place, *ways])
+    head = ("device", "x [mm]", "y [mm]", "z [mm]", "axis, out of it", "forward")
+    return table("Mounts", head, rows)
+
+
+def _rings(plan: RigPlan) -> str:
+    rows: list[list[str]] = []
+    for record in plan.document.projectors:
+        shares, rings = record.ring_shares, record.rings
+        gap = None if rings is None else rings.gap_m
+        by_ring = () if shares is None else (shares.on_object, shares.measured)
+        exposure = record.exposure
+        rows.append(
+            [
+                record.id,
+                str(len(record.ring_radii)),
+                str(n_frames((len(record.ring_radii),), len(plan.cameras))),
+                "" if gap is None else f"{1e3 * gap[0]:.1f} to {1e3 * gap[1]:.1f}",
+                *(percent(float(np.mean(values))) for values in by_ring),
+                *("" for _ in range(2 - len(by_ring))),
+                "" if exposure is None else f"{1e3 * exposure.exposure_s:.1f}",
+            ]
+        )
+    head = ("projector", "rings", "frames", "apart on the object [mm]")
+    head += ("of a ring on the object", "of a ring measured", "exposure [ms]")
+    return table("Rings", head, rows)
+
+
+def _sequence(plan: RigPlan) -> str:
+    schedule = plan.document.firing_schedule
+    if schedule is None:
+        return ""
+    rows = [[str(k), ", ".join(group)] for k, group in enumerate(schedule.groups, 1)]
+    note = " ".join(schedule_lines(plan.document)).removeprefix("FIRING").strip()
+    return table("Exposure sequence", ("step", "projectors that shine"), rows, note)
+
+
+def _baselines(plan: RigPlan) -> str:
+    rows = [
+        [
+            " - ".join(row.cameras),
+            f"{1e3 * row.d:.1f}",
+            "" if row.d_max is None else f"{1e3 * row.d_max:.1f}",
+            f"{np.degrees(row.phi):.1f}",
+            f"{np.degrees(row.phi_max):.1f}",
+            f"{np.degrees(row.slack):.1f}",
+            "yes" if row.covered else "no",
+            row.limit,
+        ]
+        for row in plan.document.baselines
+    ]
+    head = ("cameras", "d [mm]", "largest d [mm]", "phi [deg]", "largest phi [deg]")
+    head += ("slack [deg]", "covered", "limited by")
+    note = "The tightest seam point of each pair, eqs. (9) and (10) of the paper."
+    return table("Baselines", head, rows, note)

@@ -1,0 +1,58 @@
+"""HTML from values: whatever comes from a file is escaped here, once."""
+
+from collections.abc import Iterable, Sequence
+from html import escape
+
+Cell = str | int | float | None
+
+
+def element(name: str, content: str, **attributes: str) -> str:
+    """Return an element around markup; attributes are escaped.
+
+    `class_` becomes class, `aria_label` aria-label.
+    """
+    given = "".join(
+        f' {key.rstrip("_").replace("_", "-")}="{escape(value)}"'
+        for key, value in attributes.items()
+    )
+    return f"<{name}{given}>{content}</{name}>"
+
+
+def paragraphs(lines: Iterable[str], **attributes: str) -> str:
+    """Return plain text as paragraphs."""
+    return "".join(element("p", escape(line), **attributes) for line in lines)
+
+
+def table(
+    caption: str, head: Sequence[str], rows: Iterable[Sequence[Cell]], note: str = ""
+) -> str:
+    """Return a table of plain values: the first cell of a row is its heading.
+
+    Numbers come as text, so that each column says how exactly; a cell that begins with
+    a digit or a sign stands to the right. Nothing of no rows.
+    """
+    body = "".join(_row(row) for row in rows)
+    if not body:
+        return ""
+    titles = "".join(element("th", escape(title), scope="col") for title in head)
+    below = element("p", escape(note), class_="small") if note else ""
+    parts = element("caption", escape(caption)) + element("thead", f"<tr>{titles}</tr>")
+    whole = element("table", parts + element("tbody", body))
+    # It scrolls by itself where it is wider than the screen, with keys too.
+    scrolled = element(
+        "div", whole, class_="scroll", tabindex="0", role="region", aria_label=caption
+    )
+    return element("div", scrolled + below, class_="entry")
+
+
+def _row(cells: Sequence[Cell]) -> str:
+    first, *others = (("" if cell is None else str(cell)) for cell in cells)
+    return element(
+        "tr",
+        element("th", escape(first), scope="row") + "".join(map(_data, others)),
+    )
+
+
+def _data(text: str) -> str:
+    number = text[:1].isdigit() or text[:1] in "+-−"
+    return element("td", escape(text), **({"class_": "n"} if number and text else {}))
