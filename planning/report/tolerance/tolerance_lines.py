@@ -102,7 +102,7 @@ def _loosest(found: Tolerance) -> Iterator[str]:
     best = found.loosest
     if best is None:
         return
-    met = f"{best.n_met} of {best.n_rigs} rigs, as many again as above, meet everything"
+    met = f"{best.n_met} of {best.n_rigs} rigs, half of them drawn for this, meet all"
     if best.scale > 0.0:
         yield (
             f"{'at least ' * best.largest_tried}{mounting_words(best.mounting)}: "
