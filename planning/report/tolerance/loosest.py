@@ -130,8 +130,13 @@ def loosest(
     )
     if scale > 0.0 or case.calibration == PERFECT:
         return found
+
+    @cache
+    def calibrated(scale: float) -> tuple[BuiltCase, Mounting]:
+        return case.calibrated(scale), mounting
+
     scale, n_met = sought(
-        cache(lambda scale: (case.calibrated(scale), mounting)),
+        calibrated,
         "mounted as stated, errors of the calibration {:.3g} times as large",
     )
     return replace(
