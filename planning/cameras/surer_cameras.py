@@ -31,6 +31,8 @@ from .proved_cameras import CameraStage
 _EXCHANGED, _ADDED = 12, 60
 # Gains below this share aren't worth another camera, nor another exchange.
 _GAIN = 5e-4
+# Of the accuracy, kept free beyond what drawn rigs exceed the prediction by.
+_RMS_SPARE = 0.005
 # Selections that are looked at in full, at most.
 _WORK = 20_000
 # What is lacking, of the most important first.
@@ -44,11 +46,14 @@ class Aim:
     Attributes:
         quantile: Share of drawn rigs.
         rms_m: What the rms error of so many stays below [m]; None: nothing is asked.
+        drawn_m: What drawn rigs of the cameras given reach instead [m], which corrects
+            what is predicted; None: not known.
         more: Of what is reachable, share that must be measured beyond the present.
     """
 
     quantile: float
     rms_m: float | None
+    drawn_m: float | None = None
     more: float = 0.0
 
 
@@ -101,6 +106,10 @@ def surer_cameras(
             )
         )
 
+    if aim.rms_m is not None and aim.drawn_m is not None:
+        predicted = errors.of_rigs(start, aim.quantile)
+        limit = aim.rms_m * predicted / aim.drawn_m * (1.0 - _RMS_SPARE)
+        aim = replace(aim, rms_m=limit)
     search = _Search(
         scene,
         errors,
@@ -122,7 +131,10 @@ def _candidates(scene: Scene, like: PlannedCamera) -> Candidates[PlannedCamera]:
 
 @dataclass(eq=False)
 class _Search:
-    """Exchanges cameras while that helps, adds one where it doesn't suffice."""
+    """Exchanges cameras while that helps, adds one where it doesn't suffice.
+
+    In the end those go without which the aim is reached.
+    """
 
     scene: Scene
     errors: PairErrors
@@ -142,13 +154,18 @@ class _Search:
         self._squares = np.square(np.minimum(sigma, worst))
 
     def run(self, chosen: list[int]) -> list[int]:
-        """Return cameras by their columns."""
+        """Return cameras by their columns, no fewer than are given."""
+        fewest = len(chosen)
         chosen, now = self._exchanged(chosen, self._short(chosen))
         while not self._reached(now) and len(chosen) < (self.most or len(chosen) + 1):
             more = self._best(chosen, [*self._by_mean(chosen, _ADDED)])
             if more is None or not _gains(more[1], now):
                 break
             chosen, now = self._exchanged(*more)
+        for c in reversed(chosen[self.n_existing :]):
+            others = [other for other in chosen if other != c]
+            if len(others) >= fewest and self._short(others) == (0, 0.0):
+                chosen = others
         return chosen
 
     def _short(self, chosen: Sequence[int]) -> _Lack:

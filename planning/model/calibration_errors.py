@@ -38,6 +38,15 @@ class CalibrationErrors:
         """Standard deviation of the principal point along any one line [px]."""
         return self.principal_px / sqrt(2.0)
 
+    def times(self, scale: float) -> "CalibrationErrors":
+        """Return errors so many times as large."""
+        return CalibrationErrors(
+            scale * self.angle,
+            scale * self.position_m,
+            scale * self.focal,
+            scale * self.principal_px,
+        )
+
 
 PERFECT = CalibrationErrors()
 

@@ -104,12 +104,12 @@ def test_cameras_are_added_until_the_aim_is_reached(plan, case):
     views = CandidateViews(scene.among(()), (*plan.cameras, *around))
     stage = SimpleNamespace(cover=SimpleNamespace(candidates=views))
 
-    def found(rms, more=0.0, most=None):
+    def found(rms, more=0.0, most=None, drawn=None):
         required = replace(scene.requirements, max_cameras=most)
         return surer_cameras(
             replace(scene, requirements=required),
             *(projectors, stage, cameras),
-            *(Aim(0.95, rms, more), 20),
+            *(Aim(0.95, rms, drawn, more), 20),
         )
 
     assert found(1.01 * alone) == cameras
@@ -118,11 +118,17 @@ def test_cameras_are_added_until_the_aim_is_reached(plan, case):
     assert after.of_rigs(range(len(surer)), 0.95) <= 0.95 * alone
     measured = after.measured(range(len(surer))).sum()
     assert measured >= before.measured([0]).sum()
-    again = found(0.95 * alone)
+    # As far as drawn rigs exceed what is predicted, less is aimed at.
+    again = found(0.95 * alone / (1.0 - searching._RMS_SPARE), drawn=alone)
     assert [c.world_from_device.tolist() for c in again] == [
         c.world_from_device.tolist() for c in surer
     ]
     assert len(found(0.1 * alone, most=2)) == 2
+    # No camera is kept that the aim is reached without.
+    for k in range(len(surer)):
+        others = [c for c in range(len(surer)) if c != k]
+        fewer = after.measured(others).sum() < before.measured([0]).sum()
+        assert fewer or after.of_rigs(others, 0.95) > 0.95 * alone
     # Where nothing is asked of errors, more of the surface may be.
     wider = found(None, more=0.1)
     seen = _on_its_samples(case, projectors, wider).measured(range(len(wider)))

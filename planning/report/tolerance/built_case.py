@@ -119,6 +119,10 @@ class BuiltCase:
         """Return the case for threads that each look at a rig of their own."""
         return replace(self, scene=replace(self.scene, threads=1))
 
+    def calibrated(self, scale: float) -> "BuiltCase":
+        """Return the case with errors of the calibration so many times as large."""
+        return replace(self, calibration=self.calibration.times(scale))
+
     @cached_property
     def planned(self) -> Outcome:
         """What the plan itself does."""

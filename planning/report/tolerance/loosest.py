@@ -1,18 +1,21 @@
 """The loosest mounting at which enough drawn rigs still meet what is asked.
 
-One scale for all bounds is sought by doubling and bisection over the same drawn rigs,
-so that a rig differs from one scale to the next by its bounds alone. A rig that met
-what is asked at a scale is taken to meet it at every smaller one, and one that missed
-it to miss it at every larger one. That needn't be so, so the scale is confirmed on
-other rigs, and taken back until they agree.
+One scale for all bounds is sought by doubling and bisection, over the drawn rigs and as
+many other ones, each of which must do; a rig differs from one scale to the next by its
+bounds alone. A rig that met what is asked at a scale is taken to meet it at every
+smaller one, and one that missed it to miss it at every larger one. That needn't be so:
+the scale found is looked at once more, and taken back where it isn't.
+
+Where no mounting will do, the calibration is at fault: its scale is sought likewise.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
 from math import ceil
 
 from geometry.parallel import mapped
-from planning.model.calibration_errors import Mounting
+from planning.model.calibration_errors import PERFECT, CalibrationErrors, Mounting
 from planning.model.progress import Report
 
 from .asked import Asked
@@ -22,8 +25,10 @@ from .drawn_rigs import CONFIRMING, DRAWN, Deviates
 # The largest scale tried, and the smallest, by powers of two.
 _DOUBLINGS, _HALVINGS = 5, 6
 _BISECTIONS = 5
-# Where other rigs don't confirm a scale, it is taken back so far, so often.
-_BACK, _TIMES_BACK = 0.9, 6
+# Where a scale that was found doesn't hold, it is taken back so far, so often.
+_BACK, _TIMES_BACK = 0.97, 20
+
+_At = Callable[[float], tuple[BuiltCase, Mounting]]
 
 
 @dataclass(frozen=True)
@@ -33,33 +38,31 @@ class Loosest:
     Attributes:
         scale: Of the bounds stated; 0: none does, not even none at all.
         mounting: These bounds.
-        n_met: Of the confirming rigs, those that meet what is asked there.
-        n_confirming: How many they are.
+        n_met: Of the rigs, the drawn ones and as many others, those that meet it there.
+        n_rigs: How many they are.
         largest_tried: Whether no looser one was tried.
+        of_calibration: Where none does: of the calibration's errors, the scale at which
+            the stated mounting does; 0: none; 1: not sought.
+        calibration: These errors.
     """
 
     scale: float
     mounting: Mounting
     n_met: int
-    n_confirming: int
-    largest_tried: bool = False
+    n_rigs: int
+    largest_tried: bool
+    of_calibration: float
+    calibration: CalibrationErrors
 
 
 class _Scales:
     """Which of the same rigs meet what is asked, scale by scale."""
 
     def __init__(
-        self,
-        case: BuiltCase,
-        asked: Asked,
-        mounting: Mounting,
-        *,
-        n: int,
-        seed: int,
-        threads: int,
+        self, at: _At, asked: Asked, *, n: int, seed: int, stream: int, threads: int
     ) -> None:
-        self._case, self._asked, self._mounting = case, asked, mounting
-        self._seed, self._threads = seed, threads
+        self._at, self._asked, self._threads = at, asked, threads
+        self._seed, self._stream = seed, stream
         self._met, self._missed = [-1.0] * n, [float("inf")] * n
 
     def enough(self, scale: float, least: int) -> bool:
@@ -76,19 +79,17 @@ class _Scales:
                     self._missed[index] = scale
         return n_met >= least
 
-    def confirmed(self, scale: float) -> int:
-        """Return how many of as many other rigs meet it."""
-        return sum(self._meet(scale, range(len(self._met)), CONFIRMING))
+    def met(self, scale: float) -> int:
+        """Return how many meet it; all are looked at."""
+        return sum(self._meet(scale, range(len(self._met))))
 
-    def _meet(
-        self, scale: float, rigs: list[int] | range, stream: int = DRAWN
-    ) -> list[bool]:
-        case, mounting = self._case, self._mounting.times(scale)
+    def _meet(self, scale: float, rigs: list[int] | range) -> list[bool]:
+        case, mounting = self._at(scale)
         sizes = len(case.rig.devices), len(case.target)
 
         def meets(index: int) -> bool:
             deviates = Deviates.drawn(
-                *sizes, seed=self._seed, stream=stream, index=index
+                *sizes, seed=self._seed, stream=self._stream, index=index
             )
             return not self._asked.missed(case.drawn(mounting, deviates))
 
@@ -106,29 +107,66 @@ def loosest(
     threads: int = 2,
     report: Report = lambda line: None,
 ) -> Loosest:
-    """Return the largest scale of a mounting that so many of n rigs meet."""
-    scales = _Scales(case, asked, mounting, n=n, seed=seed, threads=threads)
-    least = ceil(quantile * n)
+    """Return the largest scale of a mounting that so many of n rigs meet, twice."""
+
+    def sought(at: _At, words: str) -> tuple[float, int]:
+        each = [
+            _Scales(at, asked, n=n, seed=seed, stream=stream, threads=threads)
+            for stream in (DRAWN, CONFIRMING)
+        ]
+        return _largest(each, ceil(quantile * n), lambda s: report(words.format(s)))
+
+    scale, n_met = sought(
+        lambda scale: (case, mounting.times(scale)), "mounting {:.3g} times as loose"
+    )
+    found = Loosest(
+        scale,
+        mounting.times(scale),
+        n_met,
+        2 * n,
+        scale == 2.0**_DOUBLINGS,
+        1.0,
+        case.calibration,
+    )
+    if scale > 0.0 or case.calibration == PERFECT:
+        return found
+
+    @cache
+    def calibrated(scale: float) -> tuple[BuiltCase, Mounting]:
+        return case.calibrated(scale), mounting
+
+    scale, n_met = sought(
+        calibrated,
+        "mounted as stated, errors of the calibration {:.3g} times as large",
+    )
+    return replace(
+        found,
+        n_met=n_met,
+        of_calibration=scale,
+        calibration=case.calibration.times(scale),
+    )
+
+
+def _largest(
+    rigs: list[_Scales], least: int, report: Callable[[float], None]
+) -> tuple[float, int]:
+    """The largest scale that so many of either rigs meet, and how many of all do."""
 
     def enough(scale: float) -> bool:
-        report(f"mounting {scale:.3g} times as loose")
-        return scales.enough(scale, least)
+        report(scale)
+        return all(each.enough(scale, least) for each in rigs)
 
     low, high = _bracket(enough)
     for _ in range(_BISECTIONS if 0.0 < low < high else 0):
         middle = (low * high) ** 0.5
         low, high = (middle, high) if enough(middle) else (low, middle)
-    n_met = scales.confirmed(low)
     for _ in range(_TIMES_BACK):
-        if n_met >= least or low == 0.0:
-            break
+        n_met = [each.met(low) for each in rigs]
+        if min(n_met) >= least or low == 0.0:
+            return low, sum(n_met)
         low *= _BACK
-        report(f"other rigs don't confirm it: {low:.3g} times")
-        n_met = scales.confirmed(low)
-    if n_met < least:
-        low = 0.0
-        n_met = scales.confirmed(low)
-    return Loosest(low, mounting.times(low), n_met, n, low == 2.0**_DOUBLINGS)
+        report(low)
+    return 0.0, sum(each.met(0.0) for each in rigs)
 
 
 def _bracket(enough: Callable[[float], bool]) -> tuple[float, float]:

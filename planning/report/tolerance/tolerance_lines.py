@@ -20,7 +20,7 @@ def tolerance_lines(found: Tolerance) -> list[str]:
     question = found.question
     head = [
         f"{count_words(len(found.rigs), 'drawn rig')}, seed {question.seed}"
-        + ("; INTERRUPTED" if found.interrupted else ""),
+        + "; INTERRUPTED: the same command goes on from here" * found.interrupted,
         f"mounted within {mounting_words(question.mounting)} (uniform), known once "
         f"calibrated",
         f"calibration leaves {calibration_words(question.calibration)} (normal, rms "
@@ -102,17 +102,22 @@ def _loosest(found: Tolerance) -> Iterator[str]:
     best = found.loosest
     if best is None:
         return
-    of = f"{best.n_met} of {best.n_confirming}"
-    if best.scale == 0.0:
+    met = f"{best.n_met} of {best.n_rigs} rigs, half of them drawn for this, meet all"
+    if best.scale > 0.0:
         yield (
-            f"no mounting will do: with devices exactly as planned {of} other rigs "
-            f"meet every requirement"
+            f"{'at least ' * best.largest_tried}{mounting_words(best.mounting)}: "
+            f"{best.scale:.3g} times what is stated; {met}"
         )
         return
-    yield (
-        f"{'at least ' * best.largest_tried}{mounting_words(best.mounting)}: "
-        f"{best.scale:.3g} times what is stated; {of} other rigs meet every requirement"
-    )
+    yield "no mounting will do, not even devices exactly as planned"
+    if best.of_calibration == 0.0:
+        yield "nor will any calibration with the mounting as stated"
+    elif best.of_calibration < 1.0:
+        yield (
+            f"with the mounting as stated a calibration will do that leaves "
+            f"{calibration_words(best.calibration)}, {best.of_calibration:.3g} times "
+            f"what is stated; {met}"
+        )
 
 
 def _first_order(found: Tolerance) -> Iterator[str]:

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 from support.fewer_samples import draw_fewer
 
 from planning.model.calibration_errors import (
@@ -17,7 +18,13 @@ from planning.model.errors import InputError
 from planning.report.tolerance import tolerance as tolerance_module
 from planning.report.tolerance.asked import Asked, Figures
 from planning.report.tolerance.built_case import BuiltCase
-from planning.report.tolerance.drawn_rigs import Deviates, bounds_of, deviations_of
+from planning.report.tolerance.drawn_rigs import (
+    CONFIRMING,
+    DRAWN,
+    Deviates,
+    bounds_of,
+    deviations_of,
+)
 from planning.report.tolerance.loosest import loosest
 from planning.report.tolerance.sensitivities import first_order, sensitivities
 from planning.report.tolerance.studies import StudyFile
@@ -217,7 +224,8 @@ def test_loosest_mounting_is_the_quantile_of_what_each_rig_bears(quantile):
         off = abs(mounting.position_m * deviates.mounted[0, 0])
         return Figures(1.0, float(off <= 1e-3), 1.0, 1.0, 0.0, 0.0)
 
-    case = SimpleNamespace(rig=SimpleNamespace(devices=[None]), target=[], drawn=drawn)
+    one = SimpleNamespace(devices=[None])
+    case = SimpleNamespace(rig=one, target=[], drawn=drawn, calibration=PERFECT)
     asked = Asked(0.9, 0.9, 0.5, 0.9, None)
     for stated in (0.7e-3, 4e-3):
         found = loosest(
@@ -225,15 +233,46 @@ def test_loosest_mounting_is_the_quantile_of_what_each_rig_bears(quantile):
         )
         # |u| is uniform: the share that is good at a bound b is 1 mm / b.
         assert found.mounting.position_m == pytest.approx(1e-3 / quantile, rel=0.08)
-        assert found.n_met >= quantile * 400
+        assert found.n_met >= quantile * found.n_rigs == quantile * 800
     for seed in range(8):
         found = loosest(case, asked, Mounting(1e-3), quantile, n=40, seed=seed)
-        assert found.n_met >= quantile * found.n_confirming == quantile * 40
+        # Of the drawn rigs, and of the others.
+        for stream in (DRAWN, CONFIRMING):
+            good = sum(_good_rigs(drawn, found.mounting, 40, seed, stream))
+            assert good >= quantile * 40
         assert found.scale > 0.0
     never = Asked(0.9, 1.1, 0.5, 0.9, None)
     assert loosest(case, never, Mounting(1e-3), 0.5, n=8, seed=0).scale == 0.0
     always = Asked(0.9, 0.0, 0.5, 0.9, None)
     assert loosest(case, always, Mounting(1e-3), 0.5, n=8, seed=0).largest_tried
+
+
+def _good_rigs(drawn, mounting, n, seed, stream):
+    for index in range(n):
+        rig = Deviates.drawn(1, 0, seed=seed, stream=stream, index=index)
+        yield drawn(mounting, rig).coverage
+
+
+@pytest.mark.parametrize("quantile", [0.8, 0.95])
+def test_where_no_mounting_will_do_a_calibration_does(quantile):
+    # A rig's error is what its first device is turned by.
+    class Case(SimpleNamespace):
+        def calibrated(self, scale):
+            return Case(**vars(self) | {"calibration": _OFF.times(scale)})
+
+        def drawn(self, mounting, deviates):
+            off = abs(self.calibration.angle * deviates.unknown[0, 3])
+            return Figures(1.0, 1.0, 1.0, 1.0, off, off)
+
+    one = SimpleNamespace(devices=[None])
+    case = Case(rig=one, target=[], calibration=_OFF)
+    asked = Asked(0.9, 0.9, 0.5, 0.9, 0.5 * _OFF.angle)
+    found = loosest(case, asked, Mounting(1e-3), quantile, n=400, seed=0, threads=1)
+    assert found.scale == 0.0
+    expected = 0.5 / norm.ppf(0.5 + 0.5 * quantile)
+    assert found.of_calibration == pytest.approx(expected, rel=0.1)
+    assert found.calibration == _OFF.times(found.of_calibration)
+    assert found.n_met >= quantile * 800
 
 
 def test_what_is_asked_is_missed_by_name():

@@ -173,7 +173,7 @@ def drop_projector(document: dict[str, Any]) -> None:
 FAULTS = {
     "camera moved": (
         move_camera,
-        r"C2 looks as if it stood 2(\.[01].?)? mm from its place",
+        r"C2 looks as if it stood (1\.9|2(\.[01].?)?) mm from its place",
     ),
     "cameras swapped": (swap_cameras, r"C1 and C2 look swapped"),
     "focal length off": (
@@ -182,7 +182,8 @@ FAULTS = {
     ),
     "projector aimed aside": (
         aim_projector_aside,
-        r"P2 looks as if it were turned by at least 2\.9 degrees \(aimed 5[01] mm off",
+        r"P2 looks as if it were turned by at least 2\.9 degrees "
+        r"\(aimed (49|5[01]) mm off",
     ),
     "projector off": (drop_projector, r"P2 is dark: no camera saw its light"),
 }

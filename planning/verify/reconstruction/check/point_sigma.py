@@ -86,7 +86,10 @@ class Sigmas:
         for rows, tiles in seen:
             more = tiles.excess_around(square[rows], gone[rows])
             relief[rows] = np.sqrt(relief[rows] ** 2 + more)
-        bias_px = np.where(doubtful, 0.0, np.linalg.norm(left, axis=0) / a_pixel)
+        # Where there is no normal, no displacement along one tells what is left of it.
+        bias_px = np.where(doubtful, 0.0, cloud.bias_px)
+        lies, told = np.linalg.norm(left, axis=0), ~doubtful & (a_pixel > 0.0)
+        np.divide(lies, a_pixel, out=bias_px, where=told)
         outwards = onto - panel.inwards[:, None] * cloud.rays
         moved = replace(moved, bias_px=bias_px, points=outwards)
         # In a step there is no surface whose normal would make an error less.
