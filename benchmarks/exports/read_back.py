@@ -26,11 +26,11 @@ from support import camera_readers as cameras
 from support import solid_readers as solids
 from support.exported_plans import exported_plan, points_before
 
-from planning.report.export.export_formats import FORMATS
-from planning.report.export.export_frames import frame_of
-from planning.report.export.exported_rig import ExportedDevice, ExportedRig
-from planning.report.export.mitsuba_export import mitsuba_lacks, write_mitsuba
-from planning.report.export.write_exports import write_export
+from planning.handover.export.export_formats import FORMATS
+from planning.handover.export.export_frames import frame_of
+from planning.handover.export.exported_rig import ExportedDevice, ExportedRig
+from planning.handover.export.mitsuba_export import mitsuba_lacks, write_mitsuba
+from planning.handover.export.write_exports import write_export
 from planning.verify.reconstruction.render.mitsuba.materials import Surface
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ from support.exported_plans import exported_plan
 
 from planning.cli.declared.export_declared import FORMATS, MITSUBA
 from planning.cli.main import commands
-from planning.report.export import export_formats
+from planning.handover.export import export_formats
 
 
 @pytest.fixture(scope="module")
@@ -119,7 +119,7 @@ def test_mitsuba_alone_goes_where_it_went_and_says_what_it_lacks(
         (place / "README.txt").write_text("scenes\n")
         return [place / "P1.xml"]
 
-    name = "planning.report.export.mitsuba_export.write_scenes"
+    name = "planning.handover.export.mitsuba_export.write_scenes"
     monkeypatch.setattr(name, write_scenes)
     words = ["--to", "mitsuba", "--albedo", "0.3", "--frame", "0,0,1000"]
     done = export(folder, *words, "-o", tmp_path / "scenes")

@@ -3,8 +3,8 @@
 import numpy as np
 
 from geometry.devices import PinholeModel, turned_to
+from planning.handover.export.exported_rig import ExportedDevice
 from planning.model.plan import RigPlan
-from planning.report.export.exported_rig import ExportedDevice
 from support import reconstruction_rigs as rigs
 
 BODY = {"centre_m": [0.01, 0.0, -0.06], "half_m": [0.03, 0.025, 0.05]}

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.report.export.exported_rig import ExportedRig
-from planning.report.export.mount_tables import reference_point
+from planning.handover.export.exported_rig import ExportedRig
+from planning.handover.export.mount_tables import reference_point
 
 Array = NDArray[np.float64]
 

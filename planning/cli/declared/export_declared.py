@@ -9,7 +9,7 @@ import click
 from planning.cli.console import Finite, PlanFile, output_options, run
 
 MITSUBA = "mitsuba"
-# As `planning.report.export.export_formats` has them, which is heavy to import.
+# As `planning.handover.export.export_formats` has them, which is heavy to import.
 FORMATS = (
     *("opencv", "colmap", "gltf", "blender", "ros", "usd", "csv"),
     *("step", "drawing", "aim", MITSUBA),

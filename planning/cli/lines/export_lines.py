@@ -7,13 +7,13 @@ from typing import Any
 import click
 
 from planning.cli.console import given, print_json, reporter, writable
+from planning.handover.export.export_formats import FORMATS
+from planning.handover.export.export_frames import frame_of
+from planning.handover.export.exported_rig import ExportedRig
+from planning.handover.export.mitsuba_export import NAME, mitsuba_lacks, write_mitsuba
+from planning.handover.export.write_exports import README, Exported, write_export
 from planning.model.plan import RigPlan
 from planning.model.words import count_words
-from planning.report.export.export_formats import FORMATS
-from planning.report.export.export_frames import frame_of
-from planning.report.export.exported_rig import ExportedRig
-from planning.report.export.mitsuba_export import NAME, mitsuba_lacks, write_mitsuba
-from planning.report.export.write_exports import README, Exported, write_export
 from planning.verify.reconstruction.render.mitsuba.materials import Surface
 from planning.verify.reconstruction.render.mitsuba.scene_text import SceneError
 

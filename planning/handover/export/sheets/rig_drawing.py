@@ -7,8 +7,8 @@ from scipy.spatial import ConvexHull, QhullError
 
 from geometry.arrays import Array
 from geometry.poses import horizontal_axes
-from planning.report.export.exported_rig import BOX_QUADS, Content, ExportedRig
-from planning.report.export.mount_tables import reference_point
+from planning.handover.export.exported_rig import BOX_QUADS, Content, ExportedRig
+from planning.handover.export.mount_tables import reference_point
 from planning.report.summary.device_lines import axis_name
 
 from .dxf_text import DxfText

@@ -9,8 +9,8 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from geometry.arrays import Array
-from planning.report.export.exported_rig import Content, ExportedDevice, ExportedRig
-from planning.report.export.mount_tables import reference_point
+from planning.handover.export.exported_rig import Content, ExportedDevice, ExportedRig
+from planning.handover.export.mount_tables import reference_point
 
 from .landmarks import Landmarks
 

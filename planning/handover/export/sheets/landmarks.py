@@ -7,7 +7,7 @@ from geometry.curvature.curvature import principal_curvatures
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import transform
 from geometry.rays.rays import RayCaster
-from planning.report.export.exported_rig import ExportedDevice, ExportedRig
+from planning.handover.export.exported_rig import ExportedDevice, ExportedRig
 
 # Least cosine between the normal of a landmark's best face and the way to the device.
 _LEAST_FACING = 0.35

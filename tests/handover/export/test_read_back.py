@@ -9,10 +9,10 @@ from support import camera_readers as readers
 from support import solid_readers as solids
 from support.exported_plans import exported_plan, points_before
 
-from planning.report.export.export_formats import FORMATS
-from planning.report.export.export_frames import frame_of
-from planning.report.export.exported_rig import ExportedRig
-from planning.report.export.write_exports import write_export
+from planning.handover.export.export_formats import FORMATS
+from planning.handover.export.export_frames import frame_of
+from planning.handover.export.exported_rig import ExportedRig
+from planning.handover.export.write_exports import write_export
 
 FORM = {form.name: form for form in FORMATS}
 

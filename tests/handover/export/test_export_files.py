@@ -18,12 +18,12 @@ from support.solid_readers import mounts
 from geometry.devices import PinholeModel
 from geometry.files.readers import load_mesh
 from geometry.poses import inverse, transform
-from planning.report.export.export_formats import FORMATS
-from planning.report.export.export_frames import frame_of
-from planning.report.export.exported_rig import ExportedRig
-from planning.report.export.ros_files import roll_pitch_yaw
-from planning.report.export.sheets.landmarks import Landmarks
-from planning.report.export.write_exports import write_export
+from planning.handover.export.export_formats import FORMATS
+from planning.handover.export.export_frames import frame_of
+from planning.handover.export.exported_rig import ExportedRig
+from planning.handover.export.ros_files import roll_pitch_yaw
+from planning.handover.export.sheets.landmarks import Landmarks
+from planning.handover.export.write_exports import write_export
 from planning.rig.mounted import read_mounted
 from planning.rig.rig import load_rig
 
