@@ -5,7 +5,7 @@ devices in pixels, metres and radians and the requirements that a plan is held t
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -36,18 +36,21 @@ from .rig_devices import (
 )
 from .rig_requirements import build_requirements, build_workspace, limit_notes
 from .rig_tables import MountingTable, ParallelTable, PinholeTable, RigTable, RingsTable
-from .toml.rig_files import read_rig, rig_folder
+from .toml.rig_files import changed, read_rig, rig_folder
 from .wishes import Wishes
 
 Light = Literal["diverging", "parallel"]
 
 
 def load_rig(
-    name: str | Path = "default", light: Light | None = None, *, checked: bool = True
+    name: str | Path | Mapping[str, Any] = "default",
+    light: Light | None = None,
+    *,
+    checked: bool = True,
 ) -> "Rig":
-    """Load a preset by its name, or a rig file by its path; None: the rig's light.
+    """Load a preset by its name, a rig file by its path, or tables as it has them.
 
-    Unless `checked`, devices needn't be sharp at the standoff.
+    None: the rig's light. Unless `checked`, devices needn't be sharp at the standoff.
 
     Raises:
         RigError: One line for each fault: where it is, the value, the rule, what to do.
@@ -73,6 +76,16 @@ class Rig:
     table: RigTable
     light: Light
     folder: Path = Path()
+
+    def replace(self, **tables: Any) -> "Rig":  # noqa: ANN401 - as a file has them
+        """Return a rig with tables laid over it: ``placement={"standoff_mm": 900}``.
+
+        Raises:
+            RigError: As of `load_rig`.
+        """
+        rig = replace(self, table=changed(self.table, tables))
+        _check_devices(rig)
+        return rig
 
     @property
     def name(self) -> str:

@@ -416,14 +416,6 @@ def test_help_puts_every_option_into_a_group(monkeypatch, capsys):
     assert re.findall(r"--[a-z-]+", others.split("Examples:")[0]) == ["--help"]
 
 
-def test_rigs_lists_every_number_with_its_source(monkeypatch, capsys):
-    code, out, _ = in_process(monkeypatch, capsys, "rigs")
-    assert code == 0
-    assert "default:" in out
-    assert "assumed" in out
-    assert "read:" in out
-
-
 def test_a_rig_is_shown_as_a_file_that_can_be_planned(monkeypatch, capsys, tmp_path):
     code, out, _ = in_process(monkeypatch, capsys, "rigs", "show", "lee-krim-2014")
     assert code == 0

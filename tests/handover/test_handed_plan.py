@@ -121,7 +121,7 @@ def test_every_error_that_planning_raises_is_exported():
                 if name.endswith("Error") and not hasattr(builtins, name):
                     raised.add(name)
     special = {"NothingMeasuredError", "NothingLitError", "DarkError"}
-    special |= {"MissingRendererError", "SceneError"}
+    special |= {"MissingRendererError", "SceneError", "FrameError"}
     assert raised - known <= special
     for name in known:
         assert issubclass(getattr(planning, name), Exception)

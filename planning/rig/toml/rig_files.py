@@ -6,7 +6,7 @@ what to do.
 
 import difflib
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,26 +19,26 @@ from planning.model.files import reading
 from planning.model.table_types import fault_words
 from planning.rig.rig_tables import RigTable
 
+from .laying import lay_over
 from .named import WHOLE_FILE, Named
 from .preset_files import preset_names, preset_text
 
 
-def read_rig(name_or_path: str | Path) -> RigTable:
-    """Read and check a preset, or a file: text with `.toml` or a separator is a path.
+def read_rig(source: str | Path | Mapping[str, Any]) -> RigTable:
+    """Read and check a preset, a file, or tables as a file has them.
+
+    Text with `.toml` or a separator is a path.
 
     Raises:
         RigError: One line for each fault.
     """
-    if _is_path(name_or_path):
-        where, tables = str(name_or_path), _read_file(Path(name_or_path))
+    if isinstance(source, Mapping):
+        where, tables = "rig", dict(source)
+    elif _is_path(source):
+        where, tables = str(source), _read_file(Path(source))
     else:
-        name = str(name_or_path)
-        if name not in preset_names() and Path(f"{name}.toml").is_file():
-            raise RigError(
-                f"rig {name}: no such preset; did you mean the file {name}.toml?"
-            )
-        where, tables = f"rig {name}", tomllib.loads(preset_text(name))
-    named = Named(rig_folder(name_or_path))
+        where, tables = f"rig {source}", tomllib.loads(preset_text(str(source)))
+    named = Named(rig_folder(source))
     tables, table = named.resolved(tables), None
     faults = named.faults
     try:
@@ -58,9 +58,20 @@ def _follows(entry: ErrorDetails, broken: set[str]) -> bool:
     return bool(entry["loc"]) and entry["loc"][0] in broken
 
 
-def rig_folder(name_or_path: str | Path) -> Path:
+def rig_folder(source: str | Path | Mapping[str, Any]) -> Path:
     """Return where files that a rig names are looked for: beside its own."""
-    return Path(name_or_path).parent if _is_path(name_or_path) else Path()
+    if isinstance(source, Mapping) or not _is_path(source):
+        return Path()
+    return Path(source).parent
+
+
+def changed(table: RigTable, tables: Mapping[str, Any]) -> RigTable:
+    """Return a rig with tables laid over it, as over the `base` of a file.
+
+    Raises:
+        RigError: One line for each fault.
+    """
+    return read_rig(lay_over(table.model_dump(exclude_unset=True), dict(tables)))
 
 
 def _is_path(name: str | Path) -> bool:
