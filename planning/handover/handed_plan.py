@@ -1,9 +1,9 @@
 """A plan in the hands of a designer: tables, pictures, and itself in a notebook."""
 
 import html
-import io
-from base64 import b64encode
+import webbrowser
 from pathlib import Path
+from tempfile import mkdtemp
 from typing import Self
 
 from PIL import Image
@@ -13,7 +13,7 @@ from geometry.parallel import n_threads
 from planning.model.plan import RigPlan
 from planning.report.drawing.face_colours import face_status
 from planning.report.drawing.rig_picture import draw_rig
-from planning.report.summary.brief import brief
+from planning.report.page.page import PAGE, page_of, write_page
 from planning.report.summary.shortfall import shortfalls
 from planning.verify.reconstruction.check.result import Reconstruction
 from planning.verify.reconstruction.pattern_files import write_patterns
@@ -23,6 +23,9 @@ from planning.verify.verification import Verification, verify_plan
 
 from .plan_tables import Table, coverage_rows, device_rows, region_rows, table
 from .plots import PLOTS, Axes, new_axes
+
+# Of the report in a notebook.
+_FRAME_PX = 900
 
 
 class HandedPlan(RigPlan):
@@ -106,14 +109,21 @@ class HandedPlan(RigPlan):
         PLOTS[what](self, ax)
         return ax
 
+    def show(self, path: str | Path | None = None) -> Path:
+        """Write the report, open it in a browser, and return where it is.
+
+        Args:
+            path: Where it goes; None: a file in a folder of its own that stays.
+        """
+        path = Path(mkdtemp(prefix="ringrig-")) / PAGE if path is None else Path(path)
+        write_page(self, path, threads=n_threads())
+        webbrowser.open(path.resolve().as_uri())
+        return path
+
     def _repr_html_(self) -> str:
-        """Return the summary, and the picture, for a notebook."""
-        file = io.BytesIO()
-        self.draw((1000, 625)).convert("RGB").save(file, "JPEG", quality=70)
-        picture = b64encode(file.getvalue()).decode()
-        text = html.escape(brief(self, (), self.missed))
+        """Return the report in a frame, for a notebook."""
+        page = html.escape(page_of(self, threads=n_threads()), quote=True)
         return (
-            f'<pre style="line-height:1.25">{text}</pre>'
-            f'<img alt="the rig, its devices and what they measure" '
-            f'src="data:image/jpeg;base64,{picture}">'
+            f'<iframe title="report of the rig" srcdoc="{page}" width="100%" '
+            f'height="{_FRAME_PX}" style="border:0"></iframe>'
         )

@@ -2,6 +2,7 @@
 
 import ast
 import builtins
+import html
 from importlib import import_module
 from pathlib import Path
 
@@ -59,15 +60,14 @@ def test_tables_are_frames_where_pandas_is_there(plan):
     ]
 
 
-def test_it_shows_itself_in_a_notebook(plan):
-    shown = plan._repr_html_()
-    assert shown.startswith("<pre")
-    assert 'src="data:image/jpeg;base64,' in shown
-    document = plan.to_document()
-    document["meshes"][0]["path"] = "<script>alert(1)</script>"
-    assert (
-        "<script>" not in HandedPlan.from_document(document, plan.surface)._repr_html_()
-    )
+def test_it_shows_its_report_in_a_notebook_and_a_browser(plan, tmp_path, monkeypatch):
+    shown, opened = plan._repr_html_(), []
+    assert shown.startswith("<iframe ")
+    page = html.unescape(shown.split('srcdoc="')[1].split('"')[0])
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    path = plan.show(tmp_path / "mine.html")
+    assert path.read_text(encoding="utf-8") == page
+    assert opened == [path.as_uri()]
 
 
 @pytest.mark.parametrize("what", PLOTS)
