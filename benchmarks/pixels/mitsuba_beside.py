@@ -1,10 +1,11 @@
-"""Images of Mitsuba 3, a path tracer that isn't ours, beside the built-in renderer's.
+r"""Images of Mitsuba 3, a path tracer that isn't ours, beside the built-in renderer's.
 
 First both render the same matt world without a bounce: how far edges lie apart, the
 error of both clouds, and error / sigma by decile of sigma with sensor noise. Then what
 the built-in renderer leaves out, one effect after the other.
 
-    PYTHONPATH=.:tests python -m benchmarks.pixels.mitsuba_beside [PATHS [OF_EFFECTS [EFFECT...]]]
+    PYTHONPATH=.:tests python -m benchmarks.pixels.mitsuba_beside \
+        [PATHS [OF_EFFECTS [EFFECT...]]]
 
 with 48 paths a pixel for both, or so many; 0 leaves a table out. Of the effects, those
 whose names begin so, or all.
@@ -142,7 +143,9 @@ def effects(scanner: Scanner, spp: int, some: tuple[str, ...]) -> None:
             stands, seed=0, expected=expected, photometry=light, physics=physics
         )
         print(_line(effect.name, result, scanner), flush=True)
-        print(f"{time.process_time() - begin:.0f} s of CPU", file=sys.stderr, flush=True)
+        print(
+            f"{time.process_time() - begin:.0f} s of CPU", file=sys.stderr, flush=True
+        )
 
 
 def _line(name: str, result: Reconstruction, scanner: Scanner) -> str:
