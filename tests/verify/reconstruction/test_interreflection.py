@@ -17,6 +17,7 @@ from planning.verify.reconstruction.render.rendered import Spent, decode_rendere
 from planning.verify.reconstruction.scanner import Scanner
 
 CLEAN = Photometry(noisy=False, albedo_variation=0.0)
+NOISY = Photometry(albedo_variation=0.0)
 
 
 def scanner(mesh):
@@ -86,6 +87,35 @@ def test_light_on_both_sides_of_an_edge_moves_points_as_the_formula_says():
     slope = np.median((found / expected)[usable])
     assert slope == pytest.approx(1.0, abs=0.15)
     assert np.mean(np.sign(found[usable]) == np.sign(expected[usable])) > 0.97
+
+
+def test_edges_go_where_much_light_brings_the_code_of_elsewhere():
+    """And in a camera with gamma their noise is still told, within its bend."""
+    rig = scanner(sphere(0.05, subdivisions=4))
+    n_bits = rig.projectors[0].pattern.n_bits
+
+    def found(share, gamma=1.0):
+        def develop(p, c, frames):
+            stack = frames.stack.astype(np.float64)
+            light = share * (stack[0] - stack[1])
+            stack[0] += light
+            # Of a place where the first bit and the third are bright.
+            for bit in range(n_bits):
+                stack[2 + 2 * bit + (bit not in (0, 2))] += light
+            return replace(frames, stack=stack.astype(np.float32))
+
+        options = {"seed": 0, "threads": 1, "spent": Spent()}
+        noisy = replace(NOISY, gamma=gamma)
+        ((_, one), _) = decode_rendered(rig, rig, noisy, develop=develop, **options)
+        return len(one.edges), one.edges.noise_px
+
+    (before, noise), (few, _), (none, _) = (found(share) for share in (0.0, 0.05, 0.5))
+    assert before > 500
+    assert few > 0.97 * before
+    assert none < 0.1 * before
+    _, bent = found(0.0, gamma=2.2)
+    # By all pixels, half-bright ones included, it would be 3.7 times as much.
+    assert np.median(bent) < 2.5 * np.median(noise)
 
 
 def test_nothing_bounces_on_a_convex_body():

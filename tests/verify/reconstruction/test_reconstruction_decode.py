@@ -163,7 +163,7 @@ def test_a_plate_hides_and_shades_the_one_behind_it(rigs, light):
     assert not np.any(shaded & on_far)
 
 
-@pytest.mark.parametrize(("degrees", "left"), [(45.0, 0.1), (5.0, 0.4)])
+@pytest.mark.parametrize(("degrees", "left"), [(45.0, 0.1), (5.0, 0.2)])
 def test_false_edges_in_a_step_of_depth_are_found(rigs, degrees, left):
     """Across the rings few are left; nearly along them the next rings must tell."""
     taken = shot(rigs, "diverging", 3478.0, Photometry(), mesh=step(rigs, degrees)[0])
@@ -171,7 +171,8 @@ def test_false_edges_in_a_step_of_depth_are_found(rigs, degrees, left):
     for max_slant in (2.14, 1e6):
         y = decode(*taken, max_slant=max_slant).cloud.points[:, 1]
         hanging.append(np.count_nonzero((y < -6e-4) & (np.abs(y + 0.03) > 6e-4)))
-    assert hanging[1] > 40
+    # Light of both plates gives more of them away at once.
+    assert hanging[1] > 30
     assert hanging[0] < left * hanging[1]
 
 

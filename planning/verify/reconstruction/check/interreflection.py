@@ -97,7 +97,7 @@ def interreflection(
     _, cell = np.unique(grid, axis=0, return_inverse=True)
     asked, cell = able[kept := _first(cell, _POINTS)], cell[kept]
     some = cloud.take(asked)
-    bias, doubt = _moved(plan, some, albedo, rng)
+    bias, doubt = shifts(plan, some, albedo, rng)
     known = np.isfinite(bias)
     some, bias, doubt, cell = some.take(known), bias[known], doubt[known], cell[known]
     _, cell, count = np.unique(cell, return_inverse=True, return_counts=True)
@@ -118,12 +118,12 @@ def _first(groups: Indices, most: int) -> Indices:
     return order[np.arange(len(order)) - begins < most]
 
 
-def _moved(
+def shifts(
     plan: Scanner, cloud: Cloud, albedo: float, rng: np.random.Generator
 ) -> tuple[Array, Array]:
-    """Displacement of points along the surface's normal [m]; NaN: in the dark, (n,).
+    """Return displacements of points along the normal [m]; NaN: in the dark, (n,).
 
-    And its standard deviation, since few directions are followed.
+    And their standard deviation, since few directions are followed.
     """
     mesh, caster = plan.mesh, RayCaster(plan.mesh, threads=1)
     near = closest_points(mesh, cloud.points)

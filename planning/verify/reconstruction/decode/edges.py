@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 from scipy.special import erfinv
 
 from planning.verify.reconstruction.arrays import (
@@ -22,6 +21,7 @@ from planning.verify.reconstruction.arrays import (
 )
 from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
 
+from .grey_noise import GreyNoise
 from .lit_image import LitImage
 
 # A pixel is lit if white exceeds black by this many levels of 255.
@@ -33,8 +33,11 @@ _MIN_CERTAINTY = 0.18
 # Least contrast of a pixel, as a share of the largest beside it: less is the rim of an
 # object or shadow, whose mixed pixels shift edges.
 _MIN_EVENNESS = 0.6
+# Most light of elsewhere on an edge, as the share by which another bit misses its
+# level, and the standard deviations of noise that are allowed for.
+_MOST_FOREIGN, _SIGMAS = 0.2, 3.0
 # Pixels that tell the noise, and grey levels among which they are told apart.
-_FEWEST_SURE, _LEVELS = 100, 8
+_FEWEST_SURE, _LEVELS, _CLEAR = 100, 8, 0.8
 # Beyond this an edge is saturated, and its probit says nothing.
 _MAX_LEVEL = 0.98
 # Blur of a lens and its pixels that shifts edges where brightness changes [px].
@@ -95,31 +98,6 @@ def find_edges(
     return edges, lit, int(np.count_nonzero(reader.valid)), changes + more
 
 
-@dataclass(frozen=True)
-class GreyNoise:
-    """Variance of one frame's grey levels: read noise, and shot noise of light.
-
-    Attributes:
-        dark: In the dark.
-        of_light: More of it for each grey level.
-    """
-
-    dark: float
-    of_light: float
-
-    @classmethod
-    def fitted(cls, level: Array, variance: Array) -> "GreyNoise":
-        """Return the line through variances at grey levels, neither part negative."""
-        terms = np.column_stack([np.ones(len(level)), level])
-        (dark, of_light), _ = nnls(terms, variance)
-        return cls(max(float(dark), 1e-6), float(of_light))
-
-    def at(self, level: Grey) -> Array:
-        """Return the standard deviation at grey levels, any shape."""
-        light = np.maximum(level.astype(np.float64), 0.0)
-        return np.sqrt(self.dark + self.of_light * light)
-
-
 class _Reader:
     """Bits, annulus indices and normalised differences of a stack of images.
 
@@ -166,7 +144,9 @@ class _Reader:
 
     def grey_noise(self) -> GreyNoise:
         """Return the noise of one frame, from I + I_inv = W + K."""
-        i, j = np.nonzero(self.sure)
+        bit = np.subtract(self._stack[2], self._stack[3], dtype=np.float32)
+        # Bright in one and dark in the other, they add up in a camera with gamma, too.
+        i, j = np.nonzero(self.sure & (np.abs(bit) >= _CLEAR * self.contrast))
         if len(i) < _FEWEST_SURE:
             return GreyNoise(1.0, 0.0)
         step = max(1, len(i) // 20_000)
@@ -239,6 +219,7 @@ def _crossings(reader: _Reader) -> tuple[ImageEdges, Indices]:
     root_frame = 2 + 2 * reader.patterns.n_bits
     root = 0.5 * (reader.level(root_frame, i, j) + reader.level(root_frame, i, j + 1))
     good = ((first > 0.0) != (second > 0.0)) & (np.abs(root) >= _MIN_CERTAINTY)
+    good &= ~_foreign(reader, frame, i, j)
     i, j, first, second = i[good], j[good], first[good], second[good]
     zero, spread, blur = _zero_between(first, second)
     along, cross = along[good].astype(np.float64), cross[good].astype(np.float64)
@@ -258,6 +239,29 @@ def _crossings(reader: _Reader) -> tuple[ImageEdges, Indices]:
         _LENS_PX**2 * uneven,
     )
     return edges, np.array([flips, named])
+
+
+def _foreign(reader: _Reader, frame: Indices, i: Indices, j: Indices) -> Mask:
+    """Edges between (i, j) and (i, j + 1) that much light of elsewhere falls on.
+
+    A Gray code flips one bit at an edge; all others are as bright or as dark on both
+    sides, and their levels 1 or -1. Light B that comes by another surface beside the
+    direct light E brings the code of the place it comes from. Where its bit is the
+    other one::
+
+        |level| = |E - B| / (E + B) = 1 - 2 B / (E + B),   B < E
+
+    and the same light moves the edge, if its frame is among those: `interreflection`.
+    Of many bits some differ, so that the least level tells.
+    """
+    least = np.full(len(i), np.inf, dtype=np.float32)
+    for bit in range(reader.patterns.n_bits):
+        other = 2 + 2 * bit
+        level = 0.5 * np.abs(reader.level(other, i, j) + reader.level(other, i, j + 1))
+        least = np.where(frame == other, least, np.minimum(least, level))
+    noise = reader.noise.at(0.5 * (reader.half_lit(i, j) + reader.half_lit(i, j + 1)))
+    contrast = 0.5 * (reader.contrast[i, j] + reader.contrast[i, j + 1])
+    return least < 1.0 - _MOST_FOREIGN - _SIGMAS * noise / contrast
 
 
 def _unevenness(
