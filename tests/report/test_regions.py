@@ -21,7 +21,6 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
 from geometry.rays.rays import RayCaster
 from geometry.shapes.primitives import sphere
-from planning import stages
 from planning.cli.main import commands
 from planning.model.document.coverage_records import RegionRecord
 from planning.model.plan import RigPlan
@@ -43,6 +42,7 @@ from planning.report.summary.region_lines import (
 )
 from planning.report.summary.shortfall import shortfalls
 from planning.scene.draws import DRAWS
+from planning.steps import stages
 
 BALL = sphere(0.1, subdivisions=4)
 # Degrees of each face's normal off the light.

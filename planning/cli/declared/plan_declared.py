@@ -32,10 +32,12 @@ _GROUPS = {
     "How it is sought": (
         *("cameras_by", "prove", "seed", "time_limit", "threads", "no_check"),
     ),
-    "Output": (*("output", "no_patterns", "verbose", "as_json", "quiet", "debug"),),
+    "Output": (
+        *("output", "no_patterns", "no_report"),
+        *("verbose", "as_json", "quiet", "debug"),
+    ),
 }
 _EXAMPLES = (
-    "plan --mesh face.obj --max-projectors 3",
     "plan --mesh part.stl --max-projectors 4 --target surface --coverage 98%",
     "plan --mesh part.stl --max-projectors 4 --rig bench.toml --accuracy 0.1 -o out",
 )

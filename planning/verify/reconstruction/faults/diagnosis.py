@@ -52,7 +52,7 @@ def diagnose(plan: Scanner, evidence: Evidence) -> Diagnosis:
     shifted = least <= MUST_LEAVE * before or every.scatter < _SCATTERED
     if enough < before and shifted:
         search = Search(every, stated(plan, AS_PLANNED))
-        causes += search.causes(MOST_CAUSES - len(causes))[0]
+        causes += search.causes(MOST_CAUSES - len(causes), enough)[0]
     if not causes:
         return Diagnosis(remark=_remark(plan, before, least))
     return Diagnosis(tuple(causes))

@@ -52,8 +52,13 @@ class Search:
         self._least = float(np.sum(every.residuals(every.z)[:n] ** 2))
         self._form = slopes.T @ slopes, slopes.T @ wanted, float(wanted @ wanted)
 
-    def causes(self, most: int = MOST_CAUSES) -> tuple[list[Cause], Adjusted]:
-        """Return what is to blame, what explains most first, and all adjusted so."""
+    def causes(
+        self, most: int = MOST_CAUSES, enough: float = 0.0
+    ) -> tuple[list[Cause], Adjusted]:
+        """Return what is to blame, what explains most first, and all adjusted so.
+
+        Each takes more than `enough` [m] off the edges' mean distance from their rings.
+        """
         chosen: list[Change] = []
         while len(chosen) < most:
             best, found = self._as_good(chosen)[0]
@@ -61,6 +66,7 @@ class Search:
                 break
             # What this explains better isn't to blame any more.
             chosen = [c for c in chosen if self._worth(c, [*chosen, best])] + [best]
+        chosen = [c for c in chosen if self._moves(c, chosen, enough)]
         rig, found = self._bundle.supposed, self._adjusted(chosen)
         stages = [
             rig,
@@ -78,6 +84,20 @@ class Search:
                 )
             )
         return causes, found
+
+    def _moves(self, change: Change, chosen: list[Change], enough: float) -> bool:
+        """Whether it moves edges by more than sound rigs have [m].
+
+        Squares of independent distances add up; what biased edges feign takes little.
+        """
+        x = self._adjusted(chosen).x
+        undone = x.copy()
+        undone[change.columns(self._bundle)] = 0.0
+        without, left = (
+            misfit(self._bundle.evidence, self._bundle.moved(one))
+            for one in (undone, x)
+        )
+        return without**2 - left**2 > enough**2
 
     def _worth(self, change: Change, chosen: list[Change]) -> bool:
         others = [one for one in chosen if one != change]
