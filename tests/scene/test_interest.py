@@ -394,7 +394,7 @@ def test_a_weight_on_the_command_line_ends_in_a_verified_plan(
 ) -> None:
     monkeypatch.chdir(folder)
     base = ["--mesh", "box.ply", "--max-projectors", "2", "-o", tmp_path / "out"]
-    words = ["--weight", "weight.txt", "--no-check"]
+    words = ["--weight", "weight.txt", "--no-check", "--verbose"]
     code, out, err = in_process(monkeypatch, capsys, *base, *words)
     assert code == 0, err
     assert "weight.txt: 32 of 192 triangles are the target, 23.1% of the area" in err

@@ -101,7 +101,11 @@ def region_table(plan: RigPlan) -> list[str]:
             continue
         lit, measured = _shares(areas)
         reach = percent(areas.reachable_by_projectors_m2 / region.area_m2)
-        able = percent(areas.reachable_by_cameras_m2 / areas.lit_m2) if lit else "-"
+        able = (
+            percent(areas.reachable_by_cameras_m2 / areas.lit_m2)
+            if areas.lit_m2
+            else "-"
+        )
         done = percent(measured) if areas.reachable_by_cameras_m2 else "-"
         floor = areas.floor or ("none" if region.id in large else "small")
         by = " ".join((*region.lit_by, *areas.measured_by)) or "none"
