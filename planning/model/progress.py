@@ -24,9 +24,11 @@ TIME_IS_UP = TimeLimitError, Cut
 _TICK_S = 0.1
 # ... and is cut again where the first cut was swallowed, or is still cleaning up [s].
 _AGAIN_S = 1.0
-# Not in a solver of CasADi, which warns of exceptions, nor where threads are begun: one
-# that is unknown to its pool is waited for in vain. Nor amid an import.
-_WHOLE = "casadi.py", "concurrent/futures/thread.py", "<frozen importlib._bootstrap>"
+# Not in a solver of CasADi, which warns of exceptions, nor in a callback of a weak
+# reference, which swallows them, nor where threads are begun: one that is unknown to
+# its pool is waited for in vain. Nor amid an import.
+_ALWAYS = "casadi.py", "weakref.py", "concurrent/futures/thread.py"
+_WHOLE = (*_ALWAYS, "<frozen importlib._bootstrap>")
 # A stage that has said nothing for so long says that it still runs [s].
 _SILENCE_S = 30.0
 
@@ -87,7 +89,7 @@ class Stopwatch:
     def _tick(self, _: int, frame: FrameType | None) -> None:
         now = time.monotonic()
         # What was planned is still to be written, with whole packages.
-        whole = _WHOLE if self._deadline < self._limit else _WHOLE[:2]
+        whole = _WHOLE if self._deadline < self._limit else _ALWAYS
         if now < self._next_cut or _runs(frame, whole):
             return
         try:

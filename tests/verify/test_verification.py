@@ -248,7 +248,9 @@ def test_another_object_is_named_by_its_mesh_and_by_the_pixels(handmade):
     assert not found.audit.failures
     assert found.reconstruction.accuracy.bias_m == pytest.approx(5e-4, rel=0.1)
     assert found.failures[0].startswith("mesh: its bounding box (")
-    assert "the object looks 1 % larger against the mesh" in found.failures[1]
+    assert re.search(
+        r"the object looks (0\.99|1) % larger against the mesh", found.failures[1]
+    )
     assert not any("claimed" in failure for failure in found.failures)
 
 
