@@ -154,7 +154,7 @@ def test_two_ring_sets_on_a_plane_lose_nothing_of_completeness(flat, sparse, sec
     gone = cloud.points[~found.stays]
     assert KDTree(found.cloud.points).query(gone)[0].max() < 0.9e-3
     kept = np.bincount(found.cloud.projector) / np.bincount(cloud.projector)
-    assert kept.min() > (0.4 if second == 1.0 else 0.9)
+    assert kept.min() > (0.3 if second == 1.0 else 0.9)
 
 
 def test_texture_does_not_change_which_pixels_overlap(flat):
