@@ -179,8 +179,8 @@ def _fewest(plan: RigPlan) -> Iterator[_Block]:
         counts = [count_words(proof.count, kind) for kind, proof in kinds.items()]
         yield (
             "FEWEST",
-            f"{' and '.join(counts)}: proved, among candidates and over every pose in "
-            f"the workspace",
+            f"{counts[0]} and, given these, {counts[1]}: proved, among candidates and "
+            f"over every allowed pose",
             1,
         )
         return
