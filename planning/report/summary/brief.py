@@ -179,13 +179,13 @@ def _fewest(plan: RigPlan) -> Iterator[_Block]:
         counts = [count_words(proof.count, kind) for kind, proof in kinds.items()]
         yield (
             "FEWEST",
-            f"{counts[0]} and, given these, {counts[1]}: proved, among candidates and "
-            f"over every allowed pose",
-            1,
+            f"{counts[0]} and, given these, {counts[1]}: proved over candidates and "
+            f"over every pose",
+            2,
         )
         return
     for label, (kind, proof) in zip(("FEWEST", ""), kinds.items(), strict=True):
-        yield label, _proved(kind, proof), 1
+        yield label, _proved(kind, proof), 2
 
 
 def _over_all(proof: Certificate) -> bool:
