@@ -158,13 +158,10 @@ def progress(*, quiet: bool) -> Generator[Report]:
         return
     from rich.console import Console
 
-    from planning.report.live_bar import LiveBar
+    from planning.report.live_bar import live_bar
 
-    bar = LiveBar(Console(stderr=True))
-    try:
+    with live_bar(Console(stderr=True)) as bar:
         yield bar
-    finally:
-        bar.stop()
 
 
 def print_json(document: Mapping[str, Any]) -> None:

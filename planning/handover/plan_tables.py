@@ -7,14 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from geometry.poses import pan_tilt_roll
 from planning.model.plan import RigPlan
-from planning.report.summary.device_lines import aim_angles
+from planning.report.summary.device_lines import standing
+from planning.scene.placed_bodies import kind_of
 
 # A pandas.DataFrame, else a list of rows.
 Table = Any
 Row = dict[str, Any]
 _CM2 = 1e4
+# What `standing` yields, but for the distance.
+_STANDING = (
+    *("x_mm", "y_mm", "z_mm", "pan_deg", "tilt_deg", "roll_deg"),
+    *("azimuth_deg", "elevation_deg"),
+)
 
 
 def table(rows: Sequence[Row]) -> Table:
@@ -26,23 +31,14 @@ def table(rows: Sequence[Row]) -> Table:
 
 def device_rows(plan: RigPlan) -> list[Row]:
     """Return where devices stand [mm] and how they are turned [degrees]."""
-    up = np.array(plan.requirements.workspace.up)
     areas = {p.id: p.lit_area_m2 for p in plan.document.projectors}
     areas |= {c.id: c.seen_area_m2 for c in plan.document.cameras}
-    rows: list[Row] = []
-    for kind, devices in (("projector", plan.projectors), ("camera", plan.cameras)):
-        for device in devices:
-            pose = device.world_from_device
-            x, y, z = (1e3 * pose[:3, 3]).tolist()
-            angles = np.degrees(pan_tilt_roll(pose[:3, :3], up)).tolist()
-            azimuth, elevation, _ = aim_angles(device, up)
-            rows.append(
-                {"id": device.id, "kind": kind, "x_mm": x, "y_mm": y, "z_mm": z}
-                | dict(zip(("pan_deg", "tilt_deg", "roll_deg"), angles, strict=True))
-                | {"azimuth_deg": azimuth, "elevation_deg": elevation}
-                | {"area_cm2": _CM2 * areas[device.id], "existing": device.existing}
-            )
-    return rows
+    return [
+        {"id": device.id, "kind": kind_of(device)}
+        | dict(zip(_STANDING, numbers[:-1], strict=True))
+        | {"area_cm2": _CM2 * areas[device.id], "existing": device.existing}
+        for device, numbers in standing(plan)
+    ]
 
 
 def coverage_rows(plan: RigPlan) -> list[Row]:

@@ -82,6 +82,16 @@ class LiveBar:
 
 
 @contextmanager
+def live_bar(console: Console) -> Generator[Report]:
+    """Show a bar, which is gone when this ends."""
+    bar = LiveBar(console)
+    try:
+        yield bar
+    finally:
+        bar.stop()
+
+
+@contextmanager
 def shown(progress: Report | bool) -> Generator[Report | None]:
     """Give what receives lines of progress: a bar if it is True, None if False."""
     if not isinstance(progress, bool):
@@ -90,8 +100,5 @@ def shown(progress: Report | bool) -> Generator[Report | None]:
     if not progress:
         yield None
         return
-    bar = LiveBar(Console())
-    try:
+    with live_bar(Console()) as bar:
         yield bar
-    finally:
-        bar.stop()

@@ -8,18 +8,12 @@ from planning.model.document.certificates import Certificate
 from planning.model.document.coverage_records import ProjectorMarginal
 from planning.model.plan import RigPlan
 from planning.model.words import area_words, percent
+from planning.report.summary.coverage_lines import AREA_ROWS
 from planning.report.summary.region_lines import region_place
 
 from .layers import CAUSE_WORDS
 from .markup import table
 
-_ROWS = {
-    "area": "area_m2",
-    "reachable by projectors": "reachable_by_projectors_m2",
-    "lit": "lit_m2",
-    "reachable by cameras": "reachable_by_cameras_m2",
-    "measured": "measured_m2",
-}
 _COSTS = {
     "t1: a frame of the scan, by pixel": "t1",
     "t2: pixels to points, by pixel": "t2",
@@ -59,7 +53,7 @@ def _coverage(plan: RigPlan) -> str:
                 )
             ),
         ]
-        for label, key in _ROWS.items()
+        for label, key in AREA_ROWS.items()
     ]
     shares = [
         ("lit / reachable by projectors", "lit_m2", "reachable_by_projectors_m2"),

@@ -4,11 +4,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from geometry.poses import pan_tilt_roll
 from planning.model.plan import RigPlan
 from planning.model.words import area_words, percent
 from planning.report.summary.coverage_lines import schedule_lines
-from planning.report.summary.device_lines import aim_angles, axis_name, gap_lines
+from planning.report.summary.device_lines import axis_name, gap_lines, standing
 from planning.rings.acquisition import n_frames
 
 from .markup import table
@@ -24,24 +23,19 @@ def device_tables(plan: RigPlan) -> Iterator[str]:
 
 
 def _poses(plan: RigPlan) -> str:
-    space = plan.requirements.workspace
-    centre, up = np.array(space.centre), np.array(space.up)
+    up = plan.requirements.workspace.up
     areas = {p.id: (p.lit_area_m2, None) for p in plan.document.projectors}
     areas |= {c.id: (c.seen_area_m2, c.sole_area_m2) for c in plan.document.cameras}
     rows: list[list[str]] = []
-    for device in (*plan.projectors, *plan.cameras):
-        pose = device.world_from_device
-        angles = np.degrees(pan_tilt_roll(pose[:3, :3], up))
-        azimuth, elevation, _ = aim_angles(device, up)
+    for device, (*numbers, distance) in standing(plan):
         near, far = device.device.range_m
         covered, sole = areas[device.id]
         rows.append(
             [
                 device.id + (f" ({device.existing})" if device.existing else ""),
                 # Adding 0.0 leaves no -0.0.
-                *(f"{x:.1f}" for x in np.round(1e3 * pose[:3, 3], 1) + 0.0),
-                *(f"{a:.1f}" for a in np.round([*angles, azimuth, elevation], 1) + 0.0),
-                f"{1e3 * np.linalg.norm(pose[:3, 3] - centre):.1f}",
+                *(f"{number:.1f}" for number in np.round(numbers, 1) + 0.0),
+                f"{distance:.1f}",
                 f"{1e3 * near:.0f} to {1e3 * far:.0f}",
                 " x ".join(map(str, device.device.resolution)),
                 area_words(covered),

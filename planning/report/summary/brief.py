@@ -9,14 +9,14 @@ from textwrap import wrap
 
 import numpy as np
 
-from geometry.poses import horizontal_axes, pan_tilt_roll
+from geometry.poses import horizontal_axes
 from planning.model.document.certificates import Certificate
 from planning.model.plan import RigPlan
 from planning.model.words import count_words, percent
 
 from .cause_words import causes_line
 from .check_lines import error_words, unchecked
-from .device_lines import aim_angles, axis_name
+from .device_lines import axis_name, standing
 from .proof_lines import user_selection
 from .region_lines import worst_region
 from .shortfall import Shortfall, missing
@@ -41,17 +41,16 @@ def brief(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
     known = {str(one): one for one in missing(plan)}
     short = [known.get(line, Shortfall(line, line)) for line in missed]
     blocks = [
-        *_head(plan, short),
         *_measured(plan),
         *_fewest(plan),
         *_missed(plan, short),
         *_check(plan),
         *_end(plan, files),
     ]
-    rest = [line for label, text, most in blocks for line in _block(label, text, most)]
-    n_head = sum(len(_block(*block)) for block in _head(plan, short))
-    devices = _devices(plan, MOST_LINES - len(rest))
-    return "\n".join([*rest[:n_head], *devices, *rest[n_head:]])
+    head = [line for block in _head(plan, short) for line in _block(*block)]
+    rest = [line for block in blocks for line in _block(*block)]
+    devices = _devices(plan, MOST_LINES - len(head) - len(rest))
+    return "\n".join([*head, *devices, *rest])
 
 
 _Block = tuple[str, str, int]
@@ -112,22 +111,15 @@ def _target(plan: RigPlan) -> str:
 
 def _devices(plan: RigPlan, room: int) -> list[str]:
     """Return where devices stand and how they are turned, as many as there is room."""
-    workspace = plan.requirements.workspace
-    centre, up = np.array(workspace.centre), np.array(workspace.up)
-    every = (*plan.projectors, *plan.cameras)
+    every, up = list(standing(plan)), np.array(plan.requirements.workspace.up)
     # Below stands what is meant by it.
     told = every if len(every) <= room - 2 else every[: max(room - 3, _FEWEST_DEVICES)]
     lines = [
         "         position x, y, z [mm]             pan    tilt    roll   aim azimuth, "
         "elevation   standoff"
     ]
-    for device in told:
-        pose = device.world_from_device
-        x, y, z = 1e3 * pose[:3, 3]
-        angles = np.degrees(pan_tilt_roll(pose[:3, :3], up))
-        pan, tilt, roll = np.round(angles, 1) + 0.0
-        azimuth, elevation, _ = aim_angles(device, up)
-        distance = 1e3 * np.linalg.norm(pose[:3, 3] - centre)
+    for device, (x, y, z, *housing, azimuth, elevation, distance) in told:
+        pan, tilt, roll = np.round(housing, 1) + 0.0
         kept = f"  existing: {device.existing}" if device.existing else ""
         lines.append(
             f"{device.id:<4} {x:9.1f} {y:9.1f} {z:9.1f}  {pan:9.1f} {tilt:7.1f} "

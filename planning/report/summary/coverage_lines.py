@@ -15,7 +15,7 @@ from .region_lines import region_lines
 
 # Surfaces below this are told in mm² [m²].
 _SMALL_M2 = 1e-3
-_ROWS = {
+AREA_ROWS = {
     "area": "area_m2",
     "reachable by projectors": "reachable_by_projectors_m2",
     "lit": "lit_m2",
@@ -36,7 +36,7 @@ def coverage_lines(plan: RigPlan) -> list[str]:
     lit = _ratio(target.lit_m2, target.reachable_by_projectors_m2)
     measured = _ratio(target.measured_m2, target.reachable_by_cameras_m2)
     table = [f"{'':<25}{''.join(f'{title:>24}' for title in columns)}"]
-    for label, key in _ROWS.items():
+    for label, key in AREA_ROWS.items():
         cells = (area_cell(getattr(a, key), a.area_m2) for a in columns.values())
         table.append(f"{label:<25}{''.join(f'{cell:>24}' for cell in cells)}")
     lines = [

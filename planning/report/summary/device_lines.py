@@ -1,6 +1,6 @@
 """Where every device stands and how its housing is turned, as one mounts it."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -31,14 +31,9 @@ def device_lines(plan: RigPlan) -> list[str]:
     ]
     workspace = plan.requirements.workspace
     centre, up = np.array(workspace.centre), np.array(workspace.up)
-    for device in (*plan.projectors, *plan.cameras):
-        pose = device.world_from_device
-        x, y, z = 1e3 * pose[:3, 3]
-        housing = np.degrees(pan_tilt_roll(pose[:3, :3], up))
+    for device, (x, y, z, *housing, azimuth, elevation, distance) in standing(plan):
         # A roll of -0.0 is none.
         pan, tilt, roll = np.round(housing, 1) + 0.0
-        azimuth, elevation, _ = aim_angles(device, up)
-        distance = 1e3 * np.linalg.norm(pose[:3, 3] - centre)
         lines.append(
             f"{device.id:<4} {x:9.1f} {y:9.1f} {z:9.1f}    {pan:15.1f} {tilt:7.1f} "
             f"{roll:7.1f}   {azimuth:8.1f} {elevation:10.1f}   {distance:18.1f}"
@@ -53,6 +48,24 @@ def device_lines(plan: RigPlan) -> list[str]:
         f"     in the axes of the mesh file; the object's centre is at {x:.1f}, "
         f"{y:.1f}, {z:.1f} mm",
     ]
+
+
+def standing(
+    plan: RigPlan,
+) -> Iterator[tuple[PlannedProjector | PlannedCamera, list[float]]]:
+    """Yield each device, and how it stands, in nine numbers.
+
+    Position x, y, z [mm]; pan, tilt and roll of its housing, azimuth and elevation of
+    the middle of its image [degrees]; distance from the object's centre [mm].
+    """
+    workspace = plan.requirements.workspace
+    centre, up = np.array(workspace.centre), np.array(workspace.up)
+    for device in (*plan.projectors, *plan.cameras):
+        pose = device.world_from_device
+        housing = np.degrees(pan_tilt_roll(pose[:3, :3], up))
+        aim = aim_angles(device, up)[:2]
+        distance = 1e3 * float(np.linalg.norm(pose[:3, 3] - centre))
+        yield device, [*(1e3 * pose[:3, 3]).tolist(), *housing.tolist(), *aim, distance]
 
 
 def mount_lines(plan: RigPlan) -> list[str]:
