@@ -30,6 +30,8 @@ _Check = Callable[[NDArray[np.float64]], bool]
 # What candidates cover is the measure of all claims: cameras may measure this share of
 # it more, no further. Where candidates cover nearly all that is lit none can.
 _BEYOND, _NEARLY = 0.002, 0.97
+# Programs times cameras, which take that much longer: the first moves gain most.
+_CAMERA_PROGRAMS = 180
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,15 +140,18 @@ def widen_baselines(
     cameras: Sequence[PlannedCamera],
     *,
     max_evaluations: int = 48,
-    max_programs: float = np.inf,
+    max_programs: int | None = None,
     spare_field: float = 0.0,
     confirmed: bool = False,
 ) -> WidestBaselines:
     """Maximise the baselines of cameras; no move is taken that loses coverage.
 
     `spare_field` [rad] of the half fields is kept free beyond seams; if `confirmed`,
-    more samples must agree to each move.
+    more samples must agree to each move. Without `max_programs` there are the fewer
+    the more cameras there are.
     """
+    if max_programs is None:
+        max_programs = max(_CAMERA_PROGRAMS // max(len(cameras), 1), 4)
     least_lit = samples.count_lit(cameras)
     checks = _keeping_floors(samples, cameras, least_lit)
     checks += [_confirming(samples, cameras)] if confirmed else []
