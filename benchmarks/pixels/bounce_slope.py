@@ -33,6 +33,10 @@ from planning.verify.reconstruction.scanner import Scanner
 _SAME_PX = 0.5
 _CELL_M = 0.01
 _FEWEST = 10
+# Directions followed from each edge: the check's few leave cells too vague to compare.
+_DIRECTIONS = 128
+# Bits with edges enough; bit 0 holds the finest rings, every other edge.
+_BITS = 5
 
 
 def clouds(scanner: Scanner, spp: int) -> list[Cloud]:
@@ -75,7 +79,7 @@ def main(spp: int) -> None:
     near = [closest_points(scanner.mesh, c.points) for c in (before, after)]
     t = near[1].distances - near[0].distances
     halves = [
-        shifts(scanner, before, ALBEDO, np.random.default_rng(seed))[0]
+        shifts(scanner, before, ALBEDO, np.random.default_rng(seed), _DIRECTIONS)[0]
         for seed in (1, 2)
     ]
     fine = np.isfinite(t) & np.isfinite(halves[0]) & np.isfinite(halves[1])
@@ -95,6 +99,9 @@ def main(spp: int) -> None:
         "edges of C2": tuple(x[before.camera[fine] == 1] for x in (t, p, q)),
         "cells of 10 mm": tuple(mean),
     }
+    bits = scanner.projectors[0].pattern.flipping_bit[before.ring[fine]]
+    for bit in range(_BITS):
+        parts[f"edges of bit {bit}"] = tuple(x[bits == bit] for x in (t, p, q))
     for name, (a, b, c) in parts.items():
         rms = [1e3 * np.sqrt(np.mean(x**2)) for x in (a, 0.5 * (b + c))]
         print(

@@ -67,7 +67,17 @@ def bounded_projectors(
         effort = projector_bound.PROVE if prove else projector_bound.DEFAULT
         stage = prove_fewest(ready.scene, stage, ready.template, effort)
         clock.say(f"  projectors: {_bound_words(stage.certificate)}")
+    for _ in range(ready.request.spare_projectors):
+        stage = _one_projector_more(ready, stage) or stage
     return stage
+
+
+def _one_projector_more(ready: Prepared, stage: ProjectorStage) -> ProjectorStage | None:
+    allowed = ready.scene.requirements.max_projectors
+    more = larger(stage, stage.projectors, allowed)
+    if more is None:
+        return None
+    return replace(more, projectors=more.by_count[more.certificate.count])
 
 
 def placed(
@@ -244,10 +254,9 @@ def one_device_more(
     required = plan.requirements
     unlit, unmeasured = _short_of(plan)
     if unlit:
-        stage = larger(partial.stage, partial.stage.projectors, required.max_projectors)
+        stage = _one_projector_more(partial.ready, partial.stage)
         if stage is not None:
             clock.say("  fresh samples fall short: one projector more")
-            stage = replace(stage, projectors=stage.by_count[stage.certificate.count])
             return placed(partial.ready, stage, clock)
     if unmeasured:
         views = larger(partial.camera_stage, partial.cameras, required.max_cameras)

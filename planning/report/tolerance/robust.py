@@ -6,6 +6,8 @@ meet it, what they miss is mended and other rigs are drawn, in counted rounds:
 - Errors, and what cameras measure: cameras are exchanged or added (`surer_cameras`)
   until the quantile of errors that first order predicts is below the accuracy, by as
   much as drawn ones exceed the prediction of the plan before.
+- Errors that so many more cameras would take that it is the projectors' own that decide
+  (cameras don't average them): one projector more, and the plan is made again.
 - What projectors light, and single regions: these shares are required by the difference
   tighter, and the plan is made again.
 
@@ -45,6 +47,8 @@ _RIGS, _MOUNTED_RIGS = 1200, 400
 # How unlikely it must be that as many rigs meet what less than the quantile meets.
 _DOUBT = 0.05
 _ROUNDS = 5
+# Times as many cameras, beyond which a projector more is planned instead.
+_MANY = 2.0
 # What is asked beyond what drawn rigs lack: of a share, and of the accuracy where
 # points miss tau.
 _SHARE_SPARE, _TAU_SPARE = 0.0005, 0.05
@@ -114,7 +118,16 @@ def robustly(planned: Planned) -> Planned:
                     partial = latest[1]
                     # Of its own rigs nothing is known.
                     aim = replace(aim, drawn_m=None)
-                if (more := surer(partial, aim, clock)) is not None:
+                more = surer(partial, aim, clock)
+                wider = _one_projector_more(request, rounds, more)
+                if wider is not None:
+                    clock.say("  the projectors' own errors decide: one projector more")
+                    request = wider
+                    latest = planned(request, clock, keep)
+                    if latest[0].document.truncated:
+                        return _cut(rounds[-1].plan), rounds[-1].partial
+                    aim = replace(aim, drawn_m=None)
+                elif more is not None:
                     latest = write_plan(more, clock), more
                 elif wishes == rounds[-1].partial.request.wishes:
                     break
@@ -128,6 +141,20 @@ def robustly(planned: Planned) -> Planned:
         return _recorded(rounds, robust)
 
     return made
+
+
+def _one_projector_more(
+    request: PlanRequest, rounds: Sequence[_Round], more: PartialPlan | None
+) -> PlanRequest | None:
+    """A request for one projector more, once, where cameras don't help or cost much."""
+    most, first = request.wishes.max_projectors, rounds[0].plan
+    if request.spare_projectors or "rms_m" not in rounds[-1].missed_by:
+        return None
+    if len(first.projectors) >= (most or 0):
+        return None
+    if more is not None and len(more.cameras) <= _MANY * len(first.cameras):
+        return None
+    return replace(request, spare_projectors=1)
 
 
 def _robust(request: PlanRequest, asked: Requirements) -> Robust:

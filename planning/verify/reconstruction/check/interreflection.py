@@ -119,11 +119,15 @@ def _first(groups: Indices, most: int) -> Indices:
 
 
 def shifts(
-    plan: Scanner, cloud: Cloud, albedo: float, rng: np.random.Generator
+    plan: Scanner,
+    cloud: Cloud,
+    albedo: float,
+    rng: np.random.Generator,
+    n_directions: int = _DIRECTIONS,
 ) -> tuple[Array, Array]:
     """Return displacements of points along the normal [m]; NaN: in the dark, (n,).
 
-    And their standard deviation, since few directions are followed.
+    And their standard deviation, since few directions are followed of each.
     """
     mesh, caster = plan.mesh, RayCaster(plan.mesh, threads=1)
     near = closest_points(mesh, cloud.points)
@@ -138,8 +142,8 @@ def shifts(
         bit = projector.pattern.flipping_bit[cloud.ring[rows]]
         direct = np.clip(projector.incidence_cosine(x, n), 0.0, None)
         direct = direct * _falloff(projector, x)
-        rays = _cosine_directions(n, rng)
-        begin = np.repeat(x + _OFF_SURFACE * mesh.radius * n, _DIRECTIONS, axis=0)
+        rays = _cosine_directions(n, n_directions, rng)
+        begin = np.repeat(x + _OFF_SURFACE * mesh.radius * n, n_directions, axis=0)
         faces, distances = caster.first_hits(begin, rays)
         hit = np.flatnonzero(faces >= 0)
         y = begin[hit] + distances[hit, None] * rays[hit]
@@ -149,12 +153,12 @@ def shifts(
             caster,
             y,
             mesh.face_normals[faces[hit]],
-            np.repeat(bit, _DIRECTIONS)[hit],
+            np.repeat(bit, n_directions)[hit],
         )
         every = albedo * signed.reshape(len(rows), -1)
         with np.errstate(divide="ignore", invalid="ignore"):
             share = np.where(direct > 0.0, every.mean(axis=1) / direct, np.nan)
-            vague = every.std(axis=1) / (np.sqrt(_DIRECTIONS) * direct)
+            vague = every.std(axis=1) / (np.sqrt(n_directions) * direct)
         share = np.where(np.abs(share) < _MOST, share, np.nan)
         some = cloud.take(rows)
         moved[rows] = moved_by(some, n, share)
@@ -205,9 +209,9 @@ def _falloff(projector: ProjectorCalibration, points: Array) -> Array:
     return projector.light.shrink(np.maximum(depth, 1e-9)) ** 2
 
 
-def _cosine_directions(normals: Array, rng: np.random.Generator) -> Array:
-    """Directions drawn by their cosine to each normal, (n * _DIRECTIONS, 3)."""
-    every = np.repeat(normals, _DIRECTIONS, axis=0)
+def _cosine_directions(normals: Array, n_each: int, rng: np.random.Generator) -> Array:
+    """Directions drawn by their cosine to each normal, (n * n_each, 3)."""
+    every = np.repeat(normals, n_each, axis=0)
     ball = rng.standard_normal(every.shape)
     ball /= np.linalg.norm(ball, axis=1)[:, None]
     # A point of the unit sphere about the normal's tip is Lambert's law.
