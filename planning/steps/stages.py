@@ -72,7 +72,9 @@ def bounded_projectors(
     return stage
 
 
-def _one_projector_more(ready: Prepared, stage: ProjectorStage) -> ProjectorStage | None:
+def _one_projector_more(
+    ready: Prepared, stage: ProjectorStage
+) -> ProjectorStage | None:
     allowed = ready.scene.requirements.max_projectors
     more = larger(stage, stage.projectors, allowed)
     if more is None:

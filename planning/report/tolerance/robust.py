@@ -106,30 +106,27 @@ def robustly(planned: Planned) -> Planned:
                 short = _short(rounds[-1], quantile)
                 if not short or len(rounds) > _ROUNDS:
                     break
-                wishes = _tightened(rounds[-1], short, request.wishes)
+                asked = request
                 aim = _aimed(aim, short, rounds[-1])
-                partial = latest[1]
+                wishes = _tightened(rounds[-1], short, request.wishes)
                 if wishes != request.wishes:
-                    request = replace(request, wishes=wishes)
+                    request, more = replace(request, wishes=wishes), None
+                elif _projectors_decide(
+                    request, rounds, more := surer(latest[1], aim, clock)
+                ):
+                    clock.say("  the projectors' own errors decide: one projector more")
+                    request = replace(request, spare_projectors=1)
+                if request is not asked:
                     latest = planned(request, clock, keep)
                     if latest[0].document.truncated:
                         # The one before is whole, and better known.
                         return _cut(rounds[-1].plan), rounds[-1].partial
-                    partial = latest[1]
                     # Of its own rigs nothing is known.
                     aim = replace(aim, drawn_m=None)
-                more = surer(partial, aim, clock)
-                wider = _one_projector_more(request, rounds, more)
-                if wider is not None:
-                    clock.say("  the projectors' own errors decide: one projector more")
-                    request = wider
-                    latest = planned(request, clock, keep)
-                    if latest[0].document.truncated:
-                        return _cut(rounds[-1].plan), rounds[-1].partial
-                    aim = replace(aim, drawn_m=None)
-                elif more is not None:
+                    more = surer(latest[1], aim, clock)
+                if more is not None:
                     latest = write_plan(more, clock), more
-                elif wishes == rounds[-1].partial.request.wishes:
+                elif request is asked:
                     break
         except InfeasibleLimitsError as error:
             clock.say(f"  nothing tighter can be planned: {error}")
@@ -143,18 +140,16 @@ def robustly(planned: Planned) -> Planned:
     return made
 
 
-def _one_projector_more(
+def _projectors_decide(
     request: PlanRequest, rounds: Sequence[_Round], more: PartialPlan | None
-) -> PlanRequest | None:
-    """A request for one projector more, once, where cameras don't help or cost much."""
-    most, first = request.wishes.max_projectors, rounds[0].plan
-    if request.spare_projectors or "rms_m" not in rounds[-1].missed_by:
-        return None
-    if len(first.projectors) >= (most or 0):
-        return None
-    if more is not None and len(more.cameras) <= _MANY * len(first.cameras):
-        return None
-    return replace(request, spare_projectors=1)
+) -> bool:
+    """Whether a projector more is tried, once: cameras don't help, or cost much."""
+    first, last = rounds[0].plan, rounds[-1]
+    if request.spare_projectors or "rms_m" not in last.missed_by:
+        return False
+    if len(first.projectors) >= request.wishes.max_projectors:
+        return False
+    return more is None or len(more.cameras) > _MANY * len(first.cameras)
 
 
 def _robust(request: PlanRequest, asked: Requirements) -> Robust:

@@ -165,6 +165,42 @@ def test_what_projectors_light_is_required_tighter(plan, monkeypatch):
     assert "planned for lit" in " ".join(robust_lines(made))
 
 
+def test_a_projector_more_where_cameras_cost_much(plan, monkeypatch):
+    sigma = plan.requirements.triangulation.max_sigma_m
+    spare, cameras = [], 2 * len(plan.cameras)
+
+    def figures(required, aim, u):
+        # The projectors' errors, which a camera doesn't average.
+        return replace(_GOOD, rms_m=sigma * (0.5 if spare[-1] else 1.1))
+
+    planner = _Planner(plan, monkeypatch, figures)
+
+    def planned(request, clock, keep):
+        spare.append(request.spare_projectors)
+        return planner(request, clock, keep)
+
+    def surer(partial, aim, clock):
+        return SimpleNamespace(**(vars(partial) | {"cameras": (None,) * cameras}))
+
+    monkeypatch.setattr(robust_module, "surer", surer)
+    rig, wishes = (
+        load_rig("default"),
+        Wishes(max_projectors=len(plan.projectors) + 1, robust=0.9),
+    )
+    request = PlanRequest(plan.surface.mesh, rig, wishes)
+    few, _ = robustly(planned)(request, Stopwatch(), None)
+    assert (few.document.robust.n_met, spare) == (0, [0])
+    cameras += 1
+    made, _ = robustly(planned)(request, Stopwatch(), None)
+    record = made.document.robust
+    assert (record.n_met, record.rounds, spare) == (1200, 1, [0, 0, 1])
+    none_left = replace(
+        request, wishes=replace(wishes, max_projectors=len(plan.projectors))
+    )
+    robustly(planned)(none_left, Stopwatch(), None)
+    assert not spare[-1]
+
+
 def test_a_robust_plan_is_left_as_it_is(plan, monkeypatch):
     planner = _Planner(plan, monkeypatch, lambda required, aim, u: _GOOD)
     made = planner.made(robust=0.95)
