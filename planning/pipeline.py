@@ -9,6 +9,7 @@ from typing import Literal
 from threadpoolctl import threadpool_limits
 
 from geometry.mesh.mesh import TriangleMesh
+from geometry.parallel import n_threads
 from planning.model.document.certificates import CamerasBy
 from planning.model.document.device_records import RingAxis
 from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
@@ -64,7 +65,7 @@ def plan_rig(
     ring_axis: RingAxis | None = None,
     robust: float | None = None,
     seed: int = 0,
-    threads: int = 2,
+    threads: int | None = None,
     check: bool = True,
     prove: bool = False,
     cameras_by: CamerasBy = "both",
@@ -107,7 +108,7 @@ def plan_rig(
             more cameras and the check is passed; None: the rig's.
         robust: Share of drawn rigs that meet the requirements; None: none is drawn.
         seed: The same seed gives the same plan.
-        threads: Worker threads; no result depends on it.
+        threads: Worker threads; no result depends on it. None: one for each core.
         check: Whether the plan is audited and reconstructed from pixels.
         prove: Whether more work is spent on the bounds over all poses.
         cameras_by: Route to the cameras: the smallest `cover` of candidates, the
@@ -159,7 +160,7 @@ def plan_rig(
         request = replace(
             request_of(mesh, rig, wishes, clock, select=select, weight=weight),
             seed=seed,
-            threads=threads,
+            threads=threads or n_threads(),
             command=tuple(command),
             prove=prove,
             cameras_by=cameras_by,
