@@ -10,6 +10,8 @@ _MIN_TILE_PX, _MAX_TILE_PX = 6, 64
 _MIN_POINTS = 12
 # A plane is one if the points spread in two directions, at most this unevenly.
 _MIN_SPREAD = 0.02
+# Times that means are taken of means; deviations that no neighbour answers for.
+_SMOOTHED, _DEVIATIONS = 3, 3.0
 # Deviation of what a point is a mean over: the lens, pixels, three of them on a line.
 _BLURRED_PX = np.sqrt(0.7**2 + 1.0 / 12.0 + 3.0**2 / 12.0)
 
@@ -30,20 +32,24 @@ class Tiles:
         columns, rows = (place.max(axis=0) + 2).tolist()
         return cls(place[:, 1] * columns + place[:, 0], (rows, columns), side)
 
-    def sum_around(self, values: Array | None = None) -> Array:
-        """Return sums over each tile and its eight neighbours, (n_tiles,)."""
+    def sum_around(self, values: Array | None = None, times: int = 1) -> Array:
+        """Return sums over each tile and its eight neighbours, so many times over."""
         rows, columns = self.shape
         summed = np.bincount(self.of_point, values, rows * columns)
         grid = summed.astype(np.float64).reshape(self.shape)
-        padded = np.pad(grid, 1)
-        wide = padded[:-2] + padded[1:-1] + padded[2:]
-        return (wide[:, :-2] + wide[:, 1:-1] + wide[:, 2:]).ravel()
+        for _ in range(times):
+            padded = np.pad(grid, 1)
+            wide = padded[:-2] + padded[1:-1] + padded[2:]
+            grid = wide[:, :-2] + wide[:, 1:-1] + wide[:, 2:]
+        return grid.ravel()
 
     def excess_around(self, square: Array, usual: Array) -> Array:
         """Return how much more squares are than usual about each point, at least 0.
 
-        Means over nine tiles, weighted by ``1 / sqrt(usual)``: between the plain mean,
-        which the noisiest few decide, and the surest, which leaves out what is rare.
+        Means over nine tiles, of nine, of nine: of fewer points they would vary more
+        than what they tell. Weighted by ``1 / sqrt(usual)``: between the plain mean,
+        which the noisiest few decide, and the surest, which leaves out what is rare. A
+        point that lies off by more than three deviations speaks for itself.
 
         Args:
             square: Of random numbers, shape (n,).
@@ -51,9 +57,12 @@ class Tiles:
         """
         known = np.isfinite(square) & (usual > 0.0)
         weight = np.where(known, usual, np.inf) ** -0.5
-        every = np.maximum(self.sum_around(weight), np.finfo(float).tiny)
-        rest = weight * np.where(known, square - usual, 0.0)
-        return np.maximum(self.sum_around(rest) / every, 0.0)[self.of_point]
+        every = self.sum_around(weight, _SMOOTHED)
+        rest = self.sum_around(weight * np.where(known, square - usual, 0.0), _SMOOTHED)
+        mean = rest / np.maximum(every, np.finfo(float).tiny)
+        around = np.maximum(mean, 0.0)[self.of_point]
+        alone = known & (square > _DEVIATIONS**2 * (usual + around))
+        return np.where(alone, square, around)
 
 
 def plane_normals(points: Array, rays: Array, tiles: Tiles) -> tuple[Array, Array]:
