@@ -77,7 +77,8 @@ def plane_normals(points: Array, rays: Array, tiles: Tiles) -> tuple[Array, Arra
         Unit normals towards the camera, shape (n, 3), NaN where points are too few, or
         on a line; and how far a bent surface lies off the mean of what a point is one
         of [m], shape (n,). Bent by k over a width w, it lies r = k w^2 / sqrt(720) off
-        the plane of nine tiles, rms, and a mean over b (rms) k b^2 / 2 off itself.
+        the plane of nine tiles, rms, and a mean over b (rms) k b^2 / 2 off itself. The
+        mean square of what planes nearby tell: one alone is of few points.
     """
     points = points - points.mean(axis=0)
     count = tiles.sum_around()
@@ -93,6 +94,7 @@ def plane_normals(points: Array, rays: Array, tiles: Tiles) -> tuple[Array, Arra
     flat = (count >= _MIN_POINTS) & (values[:, 1] > _MIN_SPREAD * values[:, 2])
     normals = np.where(flat[:, None], vectors[:, :, 0], np.nan)[tiles.of_point]
     away = np.einsum("ij,ij->i", normals, rays) > 0.0
-    relief = np.sqrt(180.0 * np.maximum(values[:, 0], 0.0))
-    relief *= (_BLURRED_PX / (3.0 * tiles.side_px)) ** 2
+    bends = np.maximum(values[:, 0], 0.0)[tiles.of_point]
+    near = tiles.sum_around(bends, 2) / np.maximum(tiles.sum_around(times=2), 1.0)
+    relief = np.sqrt(180.0 * near) * (_BLURRED_PX / (3.0 * tiles.side_px)) ** 2
     return np.where(away[:, None], -normals, normals), relief[tiles.of_point]
