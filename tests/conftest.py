@@ -1,7 +1,6 @@
 """Fixtures that several test files share."""
 
 import importlib
-import os
 import sys
 from collections.abc import Callable, Generator
 from contextlib import AbstractContextManager, contextmanager
@@ -48,15 +47,6 @@ def _one_thread() -> Generator[None]:
     """Leave BLAS one thread: workers that share the cores would wait for each other."""
     with threadpool_limits(1, user_api="blas"):
         yield
-
-
-@pytest.fixture(scope="session", autouse=True)
-def _one_core() -> None:
-    """Give each of several workers a core: by default it then starts no thread."""
-    worker = os.environ.get("PYTEST_XDIST_WORKER", "")
-    if worker and hasattr(os, "sched_setaffinity"):
-        cores = sorted(os.sched_getaffinity(0))
-        os.sched_setaffinity(0, {cores[int(worker[2:]) % len(cores)]})
 
 
 @pytest.fixture(scope="session", autouse=True)
