@@ -67,15 +67,15 @@ def bounded_projectors(
         effort = projector_bound.PROVE if prove else projector_bound.DEFAULT
         stage = prove_fewest(ready.scene, stage, ready.template, effort)
         clock.say(f"  projectors: {_bound_words(stage.certificate)}")
+    allowed = ready.scene.requirements.max_projectors
     for _ in range(ready.request.spare_projectors):
-        stage = _one_projector_more(ready, stage) or stage
+        stage = _one_projector_more(stage, allowed) or stage
     return stage
 
 
 def _one_projector_more(
-    ready: Prepared, stage: ProjectorStage
+    stage: ProjectorStage, allowed: int | None
 ) -> ProjectorStage | None:
-    allowed = ready.scene.requirements.max_projectors
     more = larger(stage, stage.projectors, allowed)
     if more is None:
         return None
@@ -256,7 +256,7 @@ def one_device_more(
     required = plan.requirements
     unlit, unmeasured = _short_of(plan)
     if unlit:
-        stage = _one_projector_more(partial.ready, partial.stage)
+        stage = _one_projector_more(partial.stage, required.max_projectors)
         if stage is not None:
             clock.say("  fresh samples fall short: one projector more")
             return placed(partial.ready, stage, clock)
