@@ -32,7 +32,7 @@ class PlanRequest:
             of its file.
         evaluates: Whether these are all there will be.
         axis_wanted: Where ring axes stand after all; None: as was asked.
-        spare_projectors: Projectors beyond the fewest that light enough.
+        least_projectors: Projectors at least, though fewer light enough.
     """
 
     mesh: TriangleMesh
@@ -48,7 +48,7 @@ class PlanRequest:
     mounted: Mounted | None = None
     evaluates: bool = False
     axis_wanted: RingAxis | None = None
-    spare_projectors: int = 0
+    least_projectors: int = 0
 
     @property
     def ring_axis(self) -> RingAxis:

@@ -67,10 +67,10 @@ def bounded_projectors(
         effort = projector_bound.PROVE if prove else projector_bound.DEFAULT
         stage = prove_fewest(ready.scene, stage, ready.template, effort)
         clock.say(f"  projectors: {_bound_words(stage.certificate)}")
-    allowed = ready.scene.requirements.max_projectors
-    for _ in range(ready.request.spare_projectors):
-        stage = _one_projector_more(stage, allowed) or stage
-    return stage
+    more, allowed = stage, ready.scene.requirements.max_projectors
+    while more and len(more.projectors) < ready.request.least_projectors:
+        more = _one_projector_more(more, allowed)
+    return more or stage
 
 
 def _one_projector_more(

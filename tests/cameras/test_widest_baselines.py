@@ -10,6 +10,7 @@ from support.factories import make_workspace
 
 from geometry.devices import PinholeModel
 from geometry.poses import fibonacci_cap, look_at
+from planning.cameras import camera_baselines
 from planning.cameras.baselines.baseline_limits import (
     BaselineLimits,
     RingsOnSurface,
@@ -375,3 +376,23 @@ def test_mounted_cameras_slide_along_their_plane():
         off = (position - plane.centre_m) @ np.array(axes[2])
         assert abs(off) <= 0.0005 + 1e-6
         assert abs(position[2]) <= 0.2 + 1e-6
+
+
+@pytest.mark.parametrize(("n_cameras", "most"), [(1, 180), (6, 30), (24, 7), (90, 4)])
+def test_more_cameras_get_fewer_of_the_larger_programs(monkeypatch, n_cameras, most):
+    given = []
+
+    def search(*_, max_programs, **__):
+        given.append(max_programs)
+        return SimpleNamespace(run=lambda: None)
+
+    monkeypatch.setattr(camera_baselines, "BaselineSearch", search)
+    monkeypatch.setattr(camera_baselines, "baseline_limits", lambda *_: None)
+    monkeypatch.setattr(camera_baselines, "_keeping_floors", lambda *_: [])
+    samples = SimpleNamespace(
+        scene=None, surface=None, rings=None, count_lit=lambda cameras: 0
+    )
+    cameras = [None] * n_cameras
+    camera_baselines.widen_baselines(samples, cameras)
+    camera_baselines.widen_baselines(samples, cameras, max_programs=0)
+    assert given == [most, 0]

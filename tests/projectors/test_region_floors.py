@@ -5,6 +5,7 @@ sides that share an edge (at 45 degrees each), never three, and never opposite o
 """
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from support.factories import make_projector, make_requirements, make_scene
 from support.fewer_samples import draw_fewer
 from support.plain_shapes import box
 
+from planning.model.progress import Stopwatch
 from planning.projectors.fewest_projectors import confirms
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import plan_projectors
@@ -22,6 +24,7 @@ from planning.rings.ring_radii import uniform_radii
 from planning.scene.draws import Draw
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
+from planning.steps import stages
 
 # Two sides of 100 cm2, the others of 20 cm2.
 SIZE = (0.02, 0.1, 0.1)
@@ -59,6 +62,27 @@ def lit_shares(scene, projectors, n_sides):
     lit = np.any(lit_stages(scene, projectors, samples) == LIT, axis=1)
     region = scene.region[samples.samples.faces]
     return [float(lit[region == side].mean()) for side in range(n_sides)]
+
+
+@pytest.mark.parametrize(
+    ("allowed", "least", "count"), [(5, 0, 2), (5, 3, 3), (2, 3, 2), (5, 9, 2)]
+)
+def test_projectors_beyond_the_fewest_stand_where_they_are_allowed(
+    monkeypatch, allowed, least, count
+):
+    asked = {"max_projectors": allowed, "dominant_coverage": 0.8}
+    # Two light four sides of six, three all of them.
+    small = ((0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1))
+    scene, stage, _ = planned((*BIG, *small), 0.0, **asked)
+    monkeypatch.setattr(stages, "prove_fewest", lambda *_: stage)
+    request = SimpleNamespace(prove=False, least_projectors=least)
+    ready = SimpleNamespace(request=request, scene=scene, template=None)
+    found = stages.bounded_projectors(ready, stage, Stopwatch())
+    proof = found.certificate
+    assert len(found.projectors) == proof.count == proof.needed.count == count
+    # What was proved of the fewest stays.
+    assert proof.needed.lower_bound == 2
+    assert proof.status == ("optimal" if count == 2 else "feasible")
 
 
 def test_a_floor_lights_a_small_region_with_as_many_projectors():

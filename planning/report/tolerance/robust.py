@@ -27,6 +27,7 @@ from planning.model.errors import InfeasibleLimitsError
 from planning.model.plan import InterruptedPlanError, RigPlan
 from planning.model.progress import TIME_IS_UP, Stopwatch
 from planning.model.requirements import Requirements
+from planning.proofs.candidate_certificate import larger
 from planning.report.assemble import write_plan
 from planning.report.partial_plan import PartialPlan, PlanRequest
 from planning.rig.wishes import Wishes
@@ -115,7 +116,8 @@ def robustly(planned: Planned) -> Planned:
                     request, rounds, more := surer(latest[1], aim, clock)
                 ):
                     clock.say("  the projectors' own errors decide: one projector more")
-                    request = replace(request, spare_projectors=1)
+                    one_more = 1 + len(rounds[0].plan.projectors)
+                    request = replace(request, least_projectors=one_more)
                 if request is not asked:
                     latest = planned(request, clock, keep)
                     if latest[0].document.truncated:
@@ -144,12 +146,12 @@ def _projectors_decide(
     request: PlanRequest, rounds: Sequence[_Round], more: PartialPlan | None
 ) -> bool:
     """Whether a projector more is tried, once: cameras don't help, or cost much."""
-    first, last = rounds[0].plan, rounds[-1]
-    if request.spare_projectors or "rms_m" not in last.missed_by:
+    if request.least_projectors or "rms_m" not in rounds[-1].missed_by:
         return False
-    if len(first.projectors) >= request.wishes.max_projectors:
+    stage, before = rounds[0].partial.stage, rounds[0].plan.cameras
+    if larger(stage, stage.projectors, request.wishes.max_projectors) is None:
         return False
-    return more is None or len(more.cameras) > _MANY * len(first.cameras)
+    return more is None or len(more.cameras) > _MANY * len(before)
 
 
 def _robust(request: PlanRequest, asked: Requirements) -> Robust:

@@ -10,6 +10,7 @@ from geometry.shapes.primitives import sphere
 from planning.verify.reconstruction.check.interreflection import (
     interreflection,
     moved_by,
+    shifts,
 )
 from planning.verify.reconstruction.reconstruct import conclude, reconstruct
 from planning.verify.reconstruction.render.photometry import Photometry
@@ -124,6 +125,20 @@ def test_nothing_bounces_on_a_convex_body():
     assert len(found.bias) > 50
     assert np.all(found.bias == 0.0)
     assert found.record().warning() == ""
+
+
+def test_four_times_as_many_directions_leave_half_the_doubt():
+    rig = scanner(groove(30.0))
+    cloud = reconstruct(rig, seed=0).merged.cloud
+    few, more = (
+        shifts(rig, cloud, 0.08, np.random.default_rng(3), n) for n in (32, 128)
+    )
+    known = (few[1] > 0.0) & (more[1] > 0.0)
+    assert known.sum() > 500
+    ratio = np.median(few[1][known] / more[1][known])
+    assert ratio == pytest.approx(2.0, rel=0.15)
+    apart = (few[0] - more[0])[known] / np.hypot(few[1], more[1])[known]
+    assert np.sqrt(np.mean(apart**2)) == pytest.approx(1.0, abs=0.2)
 
 
 def test_a_groove_is_warned_of_the_more_the_narrower_and_brighter():
