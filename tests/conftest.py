@@ -138,22 +138,24 @@ def _load(name: str) -> ModuleType:
 
 
 @pytest.fixture(scope="session")
-def with_few_samples() -> Callable[[], AbstractContextManager[None]]:
-    """A quarter of the samples behind claims, for plans that a module shares."""
+def with_little_work() -> Callable[[], AbstractContextManager[None]]:
+    """A quarter of the samples behind claims, and rough bounds over all poses."""
 
     @contextmanager
-    def few() -> Generator[None]:
+    def little() -> Generator[None]:
+        work = _load("little_work")
         with pytest.MonkeyPatch.context() as patch:
-            _load("fewer_samples").draw_fewer(patch, claims=3000, overlaps=3000)
+            work.draw_fewer(patch, claims=3000, overlaps=3000)
+            work.bound_roughly(patch)
             yield
 
-    return few
+    return little
 
 
 @pytest.fixture
-def few_samples(
-    with_few_samples: Callable[[], AbstractContextManager[None]],
+def little_work(
+    with_little_work: Callable[[], AbstractContextManager[None]],
 ) -> Generator[None]:
-    """Claims from a quarter of the samples, where exactness isn't the question."""
-    with with_few_samples():
+    """Little work in one test, where exactness isn't the question."""
+    with with_little_work():
         yield

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.factories import make_camera, make_requirements, make_scene
-from support.fewer_samples import draw_fewer
+from support.little_work import draw_fewer
 from support.plain_shapes import box
 
 from geometry.shapes.primitives import sphere
@@ -307,7 +307,7 @@ def test_clearly_farther_apart_is_a_tenth_and_loses_neither_area_nor_overlap(
 
 
 @pytest.fixture(scope="module")
-def planned(small_job, tmp_path_factory, with_few_samples):
+def planned(small_job, tmp_path_factory, with_little_work):
     """A plan of a block by the paper's route, from the command line."""
     folder, block = (
         tmp_path_factory.mktemp("paper"),
@@ -318,7 +318,7 @@ def planned(small_job, tmp_path_factory, with_few_samples):
     (folder / "block.obj").write_text("\n".join(lines))
     words = ["--cameras-by", "paper", "--max-projectors", "2", "--target", "surface"]
     words += ["--dominant-coverage", "0.6"]
-    with pytest.MonkeyPatch.context() as patch, with_few_samples():
+    with pytest.MonkeyPatch.context() as patch, with_little_work():
         # What is proved of the projectors isn't the question.
         weak = Effort(finest=3, budget=1e6, shadows=0.0, most_samples=200)
         patch.setattr("planning.proofs.projector_bound.DEFAULT", weak)

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support.fewer_samples import draw_fewer
+from support.little_work import draw_fewer
 
 from planning.cameras import surer_cameras as searching
 from planning.cameras.pair_errors import PairErrors

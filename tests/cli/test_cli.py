@@ -25,15 +25,20 @@ SHARED = ROOT.parent / "shared" / "data"
 VOLATILE = ("created", "command", "timings_s", "cost")
 
 
-# A quarter of the samples behind claims: no test of this file is about their number.
-FEW = "from planning.scene.draws import DRAWS, Draw\n"
-FEW += "vars(DRAWS).update(claims=Draw(3000, 900), overlaps=Draw(3000, 902))\n"
+# No test of this file is about the number of samples behind claims, nor about bounds.
+LITTLE = (
+    "import pytest\nfrom support import little_work\npatch = pytest.MonkeyPatch()\n"
+)
+LITTLE += "little_work.draw_fewer(patch, claims=3000, overlaps=3000)\n"
+LITTLE += "little_work.bound_roughly(patch)\n"
 
 
 def run(*words, cwd, threads=None, before=""):
     """Run `plan` as a process of its own, on the package under test."""
     home = str(Path(planning.__file__).resolve().parents[1])
-    environment = os.environ | {"PYTHONPATH": home, "PYTHONWARNINGS": "ignore"}
+    tests = str(Path(__file__).resolve().parents[1])
+    path = os.pathsep.join((home, tests))
+    environment = os.environ | {"PYTHONPATH": path, "PYTHONWARNINGS": "ignore"}
     if threads is not None:
         environment["OMP_NUM_THREADS"] = str(threads)
         environment["OPENBLAS_NUM_THREADS"] = str(threads)
@@ -94,7 +99,7 @@ def runs(face):
         words += ["--rig", "front.toml"]
         words += ["--threads", str(threads)]
         words += ["--json", "--no-check"] * (threads == 2)
-        found.append(run(*words, cwd=folder, threads=threads, before=FEW))
+        found.append(run(*words, cwd=folder, threads=threads, before=LITTLE))
     return folder, found
 
 

@@ -4,7 +4,7 @@ import json
 import sys
 
 import pytest
-from support.fewer_samples import draw_fewer
+from support.little_work import draw_fewer
 from support.plain_shapes import box
 
 from planning.cli.main import main

@@ -2,7 +2,7 @@ import json
 
 import pytest
 from click.testing import CliRunner
-from support.fewer_samples import draw_fewer
+from support.little_work import draw_fewer
 
 from planning.cli.declared.tolerance_declared import Quantities, tolerance
 from planning.cli.main import commands

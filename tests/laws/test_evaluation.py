@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.fewer_samples import draw_fewer
+from support.little_work import draw_fewer
 from support.plain_shapes import box
 
 from geometry.mesh.mesh import TriangleMesh
@@ -101,20 +101,20 @@ def plate():
 
 
 @pytest.fixture(scope="module")
-def planned(folder, plate, with_few_samples):
+def planned(folder, plate, with_little_work):
     """A plate whose ends most of the workspace doesn't reach, from both sides."""
     wishes = "[requirements]\ncoverage = 0.8\ndominant_coverage = 0.8\n"
     wishes += "region_coverage = 0\n"
     rig = rig_file(folder, "plan.toml", wishes + "min_reachable = 0.1\n")
-    with with_few_samples():
+    with with_little_work():
         plan = made(plate, rig, max_projectors=3)
     plan.save(folder / "plan" / "plan.json")
     return rig, plan
 
 
-def test_a_plan_evaluated_has_its_own_figures(folder, plate, planned, with_few_samples):
+def test_a_plan_evaluated_has_its_own_figures(folder, plate, planned, with_little_work):
     rig, plan = planned
-    with with_few_samples():
+    with with_little_work():
         seen = made(plate, rig, fixed=read_mounted(folder / "plan", rig))
     assert seen.coverage == plan.coverage
     # What is reachable is told by the same poses.
@@ -140,12 +140,12 @@ def test_a_plan_evaluated_has_its_own_figures(folder, plate, planned, with_few_s
 
 
 def test_another_mesh_is_measured_by_the_same_rings(
-    folder, plate, planned, with_few_samples
+    folder, plate, planned, with_little_work
 ):
     """Half the plate: the middle of either side of it, that the whole had, too."""
     rig, plan = planned
     half = TriangleMesh(plate.vertices * [0.5, 1.0, 1.0], plate.faces)
-    with with_few_samples():
+    with with_little_work():
         seen = made(half, rig, fixed=read_mounted(folder / "plan", rig))
     for one, other in zip(seen.projectors, plan.projectors, strict=True):
         assert np.array_equal(one.ring_radii, other.ring_radii)
@@ -155,12 +155,12 @@ def test_another_mesh_is_measured_by_the_same_rings(
 
 
 def test_devices_that_are_kept_count_and_keep_their_names(
-    folder, plate, planned, with_few_samples
+    folder, plate, planned, with_little_work
 ):
     rig, plan = planned
     kept_ids = [plan.projectors[-1].id, plan.cameras[0].id]
     fixed = read_mounted(folder / "plan", rig, kept_ids)
-    with with_few_samples():
+    with with_little_work():
         again = made(plate, rig, fixed=fixed, max_projectors=3)
     every = {d.id: d for d in (*again.projectors, *again.cameras)}
     assert len(every) == len(again.projectors) + len(again.cameras)
@@ -224,7 +224,7 @@ BROKEN = {
 
 
 @pytest.fixture(scope="module")
-def broken(folder, plate, with_few_samples):
+def broken(folder, plate, with_little_work):
     """A rig that breaks what a planned one keeps."""
     rig = rig_file(folder, "zones.toml", ZONES)
     placement = rig.table.placement.model_copy(update={"clearance_mm": 50.0})
@@ -234,7 +234,7 @@ def broken(folder, plate, with_few_samples):
         "one,camera,0,-1000,0,0,0,0\nbeside,camera,80,-1000,0,80,0,0\n"
         "in one,camera,0,-1000,30,0,0,30\nfar,camera,0,-2300,0,0,0,0\n"
     )
-    with with_few_samples():
+    with with_little_work():
         return made(plate, rig, fixed=read_mounted(folder / "broken.csv", rig))
 
 
@@ -288,10 +288,10 @@ def test_false_claims_of_an_evaluation_are_named(broken, change, sentence):
 
 
 def test_rings_that_were_to_stay_are_held_to_what_they_were(
-    folder, plate, planned, with_few_samples
+    folder, plate, planned, with_little_work
 ):
     rig, _ = planned
-    with with_few_samples():
+    with with_little_work():
         seen = made(plate, rig, fixed=read_mounted(folder / "plan", rig))
     document = seen.to_document()
     document["projectors"][0]["ring_radii"][3] *= 1.001

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.fewer_samples import draw_fewer
+from support.little_work import draw_fewer
 from support.plain_shapes import box
 
 from geometry.devices import PinholeModel

@@ -48,7 +48,7 @@ def head():
 
 
 @pytest.fixture(scope="module")
-def plans(head, tmp_path_factory, with_few_samples):
+def plans(head, tmp_path_factory, with_little_work):
     """The plan of a file in mm, and of one in um, turned and 10^5 mm away."""
     folder = tmp_path_factory.mktemp("meshes")
     moved = head.vertices @ TURN.T + SHIFT_M
@@ -62,7 +62,7 @@ def plans(head, tmp_path_factory, with_few_samples):
         rows += [f"3 {a} {b} {c}" for a, b, c in head.faces.tolist()]
         head_line = f"OFF\n{len(vertices)} {len(head.faces)} 0"
         path.write_text("\n".join([head_line, *rows]) + "\n")
-        with with_few_samples():
+        with with_little_work():
             found.append(planned(path, unit, up))
     return found
 

@@ -33,17 +33,21 @@ def head():
 
 
 @pytest.fixture(scope="module", params=["diverging", "parallel"])
-def plan(request, head, tmp_path_factory, with_few_samples):
+def plan(request, head, tmp_path_factory, with_little_work):
     """In diverging light it is the plan that the README's library code makes."""
     if request.param == "parallel":
         rig = load_rig("default", light="parallel")
-        with with_few_samples():
+        with with_little_work():
             return plan_rig(head, rig, max_projectors=4)
     (code,) = re.findall(r"```python\n(.*?)```", README.read_text("utf-8"), re.S)
     folder = tmp_path_factory.mktemp("readme")
     shutil.copy(README.with_name("face.obj"), folder)
     names, said = {}, io.StringIO()
-    with pytest.MonkeyPatch.context() as patch, redirect_stdout(said):
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        redirect_stdout(said),
+        with_little_work(),
+    ):
         patch.chdir(folder)
         exec(code, names)
     assert "True ()" in said.getvalue()
@@ -218,7 +222,7 @@ def test_summary_names_devices_counts_and_denominators(plan):
         assert words in text
 
 
-@pytest.mark.usefixtures("few_samples")
+@pytest.mark.usefixtures("little_work")
 def test_a_small_workspace_does_not_pass_by_a_shrinking_denominator(tmp_path):
     path = tmp_path / "frontal.toml"
     path.write_text(
@@ -249,7 +253,7 @@ def test_a_small_workspace_does_not_pass_by_a_shrinking_denominator(tmp_path):
     assert audit_plan(plan, seed=3, n_samples=4000).failures == ()
 
 
-@pytest.mark.usefixtures("few_samples")
+@pytest.mark.usefixtures("little_work")
 def test_too_few_projectors_say_how_many_are_needed():
     cube = box((0.1, 0.1, 0.1), divisions=4)
     options = {"max_projectors": 1, "target": "surface", "coverage": 0.8}
@@ -276,7 +280,7 @@ def test_the_clock_cuts_before_a_first_plan(head):
         plan_rig(head, load_rig("default"), max_projectors=3, time_limit=1e-6)
 
 
-@pytest.mark.usefixtures("few_samples")
+@pytest.mark.usefixtures("little_work")
 def test_an_interrupted_run_keeps_the_plan_it_has(quick):
     def interrupt(line):
         if line.startswith("baselines"):
@@ -292,7 +296,7 @@ def test_an_interrupted_run_keeps_the_plan_it_has(quick):
     assert audit_plan(plan, seed=3, n_samples=4000).failures == ()
 
 
-@pytest.mark.usefixtures("few_samples")
+@pytest.mark.usefixtures("little_work")
 def test_a_run_cut_before_its_check_does_not_pass_for_a_checked_one(quick):
     def cut(line):
         if line.startswith("check"):
@@ -307,7 +311,7 @@ def test_a_run_cut_before_its_check_does_not_pass_for_a_checked_one(quick):
     assert "--no-check" not in text
 
 
-@pytest.mark.usefixtures("few_samples")
+@pytest.mark.usefixtures("little_work")
 @pytest.mark.parametrize(
     ("line", "nth", "stands"),
     [

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from support.factories import make_projector, make_requirements, make_scene
-from support.fewer_samples import draw_fewer
+from support.little_work import draw_fewer
 from support.plain_shapes import box
 
 from planning.model.progress import Stopwatch

@@ -416,7 +416,7 @@ def plan(small_job, tmp_path, monkeypatch, rig, words=()):
     return small_job.run(path, tmp_path, [*target, *words])
 
 
-@pytest.mark.usefixtures("few_samples")
+@pytest.mark.usefixtures("little_work")
 def test_an_accuracy_that_no_pose_reaches_exits_4_and_says_which_would_do(
     small_job, tmp_path, monkeypatch
 ):
@@ -431,7 +431,7 @@ def test_an_accuracy_that_no_pose_reaches_exits_4_and_says_which_would_do(
     assert float(told[2]) >= 90.0
 
 
-@pytest.mark.usefixtures("few_samples")
+@pytest.mark.usefixtures("little_work")
 def test_a_depth_of_field_that_holds_half_is_told_by_cause_and_audited(
     small_job, tmp_path, monkeypatch
 ):

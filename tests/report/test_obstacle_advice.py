@@ -18,13 +18,13 @@ FEW = EXACT + (
 
 
 def test_where_too_little_can_be_lit_the_obstacle_in_the_way_is_named(
-    tmp_path, with_few_samples
+    tmp_path, with_little_work
 ):
     """A lid over a plate keeps all light off its upper side; a post is harmless."""
     path = tmp_path / "rig.toml"
     path.write_text(f'base = "default"\n{LID}{FEW}')
     try:
-        with with_few_samples():
+        with with_little_work():
             plan_rig(
                 plate_of((0.1, 0.1, 0.01), divisions=4),
                 load_rig(path),

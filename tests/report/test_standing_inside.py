@@ -52,7 +52,7 @@ max_mm = [150.0, 150.0, 150.0]
 
 
 def test_a_workspace_inside_the_object_is_refused_with_what_would_fit(
-    small_job, tmp_path, monkeypatch, with_few_samples
+    small_job, tmp_path, monkeypatch, with_little_work
 ):
     ball = sphere(300.0)
     lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in ball.vertices]
@@ -60,7 +60,7 @@ def test_a_workspace_inside_the_object_is_refused_with_what_would_fit(
     (tmp_path / "ball.obj").write_text("\n".join(lines))
     head = small_job.RIG.split("[placement]")[0]
     monkeypatch.setattr(small_job, "RIG", head + RIG)
-    with with_few_samples():
+    with with_little_work():
         ended = small_job.run(tmp_path / "ball.obj", tmp_path, ["--target", "surface"])
     assert ended.code == 4
     assert "poses stand inside the object or behind its surface" in ended.message

@@ -211,7 +211,7 @@ def test_the_fewest_over_all_poses_count_those_that_are_given(existing, count, i
 
 
 @pytest.fixture(scope="module")
-def planned(tmp_path_factory, with_few_samples):
+def planned(tmp_path_factory, with_little_work):
     """A plate, seen from both sides; a projector and a camera before it already."""
     path = tmp_path_factory.mktemp("rig") / "old.toml"
     path.write_text(
@@ -230,7 +230,7 @@ def planned(tmp_path_factory, with_few_samples):
     )
     plate = box((0.1, 0.01, 0.1), divisions=4)
     try:
-        with with_few_samples():
+        with with_little_work():
             return plan_rig(
                 plate,
                 load_rig(path),

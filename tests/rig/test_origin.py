@@ -158,11 +158,11 @@ def test_messages_speak_of_places_as_they_were_written(rig_of):
 
 
 @pytest.fixture(scope="module")
-def planned(tmp_path_factory, with_few_samples):
+def planned(tmp_path_factory, with_little_work):
     path = tmp_path_factory.mktemp("rig") / "mesh.toml"
     path.write_text(FROM_MESH + SMALL)
     try:
-        with with_few_samples():
+        with with_little_work():
             return plan_rig(
                 plate(),
                 load_rig(path),

@@ -295,8 +295,8 @@ def test_arrays_that_do_not_fit_are_refused() -> None:
 
 
 @pytest.fixture(scope="module")
-def plan(mesh: TriangleMesh, with_few_samples) -> RigPlan:
-    with with_few_samples():
+def plan(mesh: TriangleMesh, with_little_work) -> RigPlan:
+    with with_little_work():
         return plan_rig(
             mesh,
             load_rig("default"),
@@ -388,7 +388,7 @@ def test_exit_codes_and_one_line_errors(
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.usefixtures("few_samples")
+@pytest.mark.usefixtures("little_work")
 def test_a_weight_on_the_command_line_ends_in_a_verified_plan(
     folder, tmp_path, monkeypatch, capsys
 ) -> None:

@@ -328,13 +328,13 @@ n_reference_cameras = 400
 
 
 @pytest.fixture(scope="module")
-def planned(tmp_path_factory, with_few_samples):
+def planned(tmp_path_factory, with_little_work):
     path = tmp_path_factory.mktemp("rig") / "stepped.toml"
     path.write_text(f'base = "default"\n{STEPPED}')
     plate = plate_of((0.1, 0.1, 0.02), divisions=4)
     plate = TriangleMesh(plate.vertices + CENTRE, plate.faces)
     try:
-        with with_few_samples():
+        with with_little_work():
             return plan_rig(
                 plate, load_rig(path), max_projectors=3, target="surface", check=False
             )

@@ -232,10 +232,10 @@ def best_plan(rig, mesh, few, **wishes):
 
 
 @pytest.fixture(scope="module")
-def planned(tmp_path_factory, with_few_samples):
+def planned(tmp_path_factory, with_little_work):
     path = tmp_path_factory.mktemp("rig") / "cell.toml"
     path.write_text(f'base = "default"\n{ROBOT}{POLE}{BENCH}{GROUND}{SMALL}')
-    return best_plan(load_rig(path), plate(), with_few_samples, cameras_by="both")
+    return best_plan(load_rig(path), plate(), with_little_work, cameras_by="both")
 
 
 def lines_of(plan):
@@ -284,13 +284,13 @@ SIGN = (
 )
 
 
-def test_housings_and_obstacles_are_told_apart(rig_of, with_few_samples):
+def test_housings_and_obstacles_are_told_apart(rig_of, with_little_work):
     """What the bench keeps all reference projectors from no housing is blamed for.
 
     Nor is an obstacle that one of these projectors meets behind a housing.
     """
     rig = rig_of(HOUSED + BENCH + SIGN + STANDING + SMALL)
-    plan = best_plan(rig, plate(), with_few_samples)
+    plan = best_plan(rig, plate(), with_little_work)
     coverage = plan.coverage
     assert coverage.blocked_by_obstacle_m2["bench"] > 0.3 * coverage.target.area_m2
     assert coverage.blocked_by_obstacle_m2["sign"] == 0.0
@@ -298,7 +298,7 @@ def test_housings_and_obstacles_are_told_apart(rig_of, with_few_samples):
     assert audit_plan(plan, n_samples=3000).failures == ()
 
 
-def test_what_they_cost_is_told_by_name(planned, rig_of, with_few_samples):
+def test_what_they_cost_is_told_by_name(planned, rig_of, with_little_work):
     coverage = planned.coverage
     assert set(coverage.blocked_by_obstacle_m2) == {"robot", "pole", "bench"}
     assert "blocked_by_obstacle" in {
@@ -307,7 +307,7 @@ def test_what_they_cost_is_told_by_name(planned, rig_of, with_few_samples):
     }
     text = summary(planned, (), ())
     assert "behind an obstacle" in text
-    free = best_plan(rig_of(SMALL), plate(), with_few_samples)
+    free = best_plan(rig_of(SMALL), plate(), with_little_work)
     assert free.coverage.target.reachable_by_projectors_m2 > (
         coverage.target.reachable_by_projectors_m2
     )

@@ -383,7 +383,7 @@ def test_the_sphere_has_no_dominant_regions_to_ask_for(body):
 
 
 @pytest.fixture(scope="module")
-def plan(body, with_few_samples, tmp_path_factory):
+def plan(body, with_little_work, tmp_path_factory):
     """One side of the ball, few candidates, without the check from pixels."""
     rig = tmp_path_factory.mktemp("rig") / "few.toml"
     rig.write_text(
@@ -399,7 +399,7 @@ def plan(body, with_few_samples, tmp_path_factory):
         spared.append(spare_field)
         return widest_routes(*words, spare_field=spare_field)
 
-    with with_few_samples(), pytest.MonkeyPatch.context() as patch:
+    with with_little_work(), pytest.MonkeyPatch.context() as patch:
         patch.setattr("planning.steps.stages.widest_routes", noted)
         made = plan_rig(body, load_rig(rig), max_projectors=8, check=False)
     assert set(spared) == {made.to_document()["ranges"]["guard_rad"]}

@@ -336,7 +336,7 @@ def test_zones_survive_the_plan_file_and_others_get_no_key(handmade, workspace_o
 
 
 @pytest.fixture(scope="module")
-def planned(tmp_path_factory, with_few_samples):
+def planned(tmp_path_factory, with_little_work):
     """A plate, a ceiling over it with a hole where one would rather stand."""
     path = tmp_path_factory.mktemp("rig") / "ceiling.toml"
     path.write_text(
@@ -350,7 +350,7 @@ def planned(tmp_path_factory, with_few_samples):
     plate = plate_of((0.1, 0.1, 0.01), divisions=4)
     plate = TriangleMesh(plate.vertices + CENTRE, plate.faces)
     try:
-        with with_few_samples():
+        with with_little_work():
             return plan_rig(
                 plate, load_rig(path), max_projectors=2, target="surface", check=False
             )

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.stats import norm
-from support.fewer_samples import draw_fewer
+from support.little_work import draw_fewer
 
 from planning.model.calibration_errors import (
     AS_PLANNED,

@@ -9,12 +9,12 @@ _SIDES = "241 521 143 351 284 625 682 483 753 387 765 867"
 
 
 def test_a_plate_of_a_tenth_of_a_millimetre_bears_the_audit(
-    small_job, tmp_path, with_few_samples
+    small_job, tmp_path, with_little_work
 ):
     lines = [f"v {x} {y} {z}" for x, y, z in _CORNERS]
     lines += [f"f {' '.join(side)}" for side in _SIDES.split()]
     (tmp_path / "plate.obj").write_text("\n".join(lines))
-    with with_few_samples():
+    with with_little_work():
         words = ["--target", "surface", "--cameras-by", "cover"]
         ended = small_job.run(tmp_path / "plate.obj", tmp_path, words)
         assert ended.code == 0, ended.message

@@ -17,6 +17,7 @@ from planning.verify.reconstruction.check.calibration_sigma import (
 )
 from planning.verify.reconstruction.check.merge import Merged, merge
 from planning.verify.reconstruction.check.overlaps import compare_overlaps
+from planning.verify.reconstruction.check.ring_fit import Lines
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.decode.decode import Pairs
 from planning.verify.reconstruction.decode.lit_image import LitImage
@@ -268,6 +269,24 @@ def test_doubt_of_a_pair_is_not_averaged_away(flat):
 
     doubted = [(key, replace(pair, cloud=unsure(pair.cloud))) for key, pair in flat]
     assert np.all(merged(doubted, FLAT).cloud.noise_px == 0.8)
+
+
+def test_lines_turn_towards_the_slope_along_which_noise_moves_points():
+    """Errors in variables: by the share of the places' spread that is noise."""
+    rng, noise, shape, slide = np.random.default_rng(0), 0.1, 2.0, -1.0
+    one, other = np.triu_indices(60, 1)
+    slopes, shares = [], []
+    for _ in range(200):
+        true, slid = rng.uniform(0.0, 1.0, 60), noise * rng.standard_normal(60)
+        places, values = true + slid, shape * true + slide * slid
+        lines = Lines.of(one, other, places[other] - places[one], np.ones(60))
+        slopes.append(lines.through(values)[0].mean())
+        shares.append(lines.astray(np.full(60, noise)).mean())
+    share = np.mean(shares)
+    assert share == pytest.approx(noise**2 / (1.0 / 12.0 + noise**2), rel=0.05)
+    assert np.mean(slopes) == pytest.approx(
+        (1.0 - share) * shape + share * slide, rel=0.01
+    )
 
 
 def test_annuli_about_a_pixel():

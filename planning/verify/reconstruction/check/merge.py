@@ -30,7 +30,8 @@ _PLACE_PX, _MUCH_WORSE = 4.0, 6.0
 # The projector blurs the edges that it draws, but not steps. Edges are taken for steps
 # below these shares of a pair's median blur: if no other camera confirms them; if an
 # edge of another projector lies there, too, or its light differs; if another camera
-# contradicts them. The light's word counts one less against what a camera confirms.
+# contradicts them. The light's word counts one less against what a camera confirms,
+# and so does sharpness: such edges may be steps, and no line has them.
 _SHARP, _CROSSED, _CONTRADICTED = 0.5, 0.75, 0.9
 
 
@@ -85,9 +86,10 @@ def merge(
     steps |= crossed & (sharpness < np.where(confirmed, _SHARP, _CROSSED))
     steps |= differs & (sharpness < _CROSSED)
     steps |= contradicted & (sharpness < _CONTRADICTED)
-    doubtful = ~confirmed & (sharpness < _CROSSED)
+    doubtful = sharpness < np.where(confirmed, _SHARP, _CROSSED)
 
-    fit = curves.only(~steps).fitted()
+    noise = cloud.noise_px / np.hypot(unsure_px, cloud.bias_px)
+    fit = curves.only(~(steps | (sharpness < _SHARP))).fitted(noise)
     left = Sigmas.of(
         cloud, fit, plan, doubtful=doubtful, steps=steps, pitch_px=pitch_px
     )

@@ -2,7 +2,8 @@
 
 Of a line's weights w, which are 1 / sigma^2 of edge noise:
 
-- noise: a share `remaining` of the point's own is left, ``1 / sqrt(sum 1 / sigma^2)``;
+- noise: a share `remaining` of the point's own is left, ``1 / sqrt(sum 1 / sigma^2)``,
+  along its normal, or what is left of it along the light, whichever is more;
 - what light does to an edge every camera sees, and at neighbouring places much alike:
   the panel's squares, brightness that changes. It isn't averaged, but weighted:
   ``sum w b / sum w`` of displacements b along the normal, whose sign is that of the
@@ -80,7 +81,12 @@ class Sigmas:
         side = np.sign(np.einsum("ij,ij->i", cloud.shift, normals))
         off *= np.nan_to_num(np.where(doubtful, 0.0, side * a_pixel))
         left = np.stack([fit.averaged(row) for row in off])
-        apart = fit.shift * np.einsum("ij,ij->i", cloud.beams, normals)
+        facing = np.einsum("ij,ij->i", cloud.beams, normals)
+        # Where slopes of rings and normals don't agree, the larger of both counts.
+        by_line, told = np.zeros(len(cloud)), certain & (a_pixel > 0.0)
+        np.divide(fit.noise * np.abs(facing), a_pixel, out=by_line, where=told)
+        moved = replace(moved, noise_px=np.maximum(moved.noise_px, by_line))
+        apart = fit.shift * facing
         gone = np.square(noise_px * a_pixel) * (1.0 - remaining**2)
         square = np.square(apart) - np.square(off - left).sum(axis=0)
         for rows, tiles in seen:

@@ -134,15 +134,19 @@ class RingCurves:
             met[np.concatenate(at)] = True
         return self._in_cloud(confirmed), self._in_cloud(contradicted & ~may_be)
 
-    def fitted(self) -> "RingFit":
+    def fitted(self, noise: Array) -> "RingFit":
         """Fit a line through the points near each, of whatever cameras, within reach.
 
-        With weights ``1 / sigma^2``; of the widest reach at which the estimates of all
+        Noise is this share of points' deviations, shape (n,): what a calibration leaves
+        counts in weights, too. With weights ``1 / sigma^2``; of the widest reach at which the estimates of all
         narrower ones still lie within `_AGREE` deviations (intersecting intervals:
         Goldenshluger & Nemirovski 1997), so that creases stay.
         """
         slide = np.linalg.norm(self.slide, axis=1)
-        slope, _ = self._on_one_surface(slide)._lines(slide).through(self.depth)
+        lines = self._on_one_surface(slide)._lines(slide)
+        slope, _ = lines.through(self.depth)
+        # Places that are noise, too, turn lines towards the way that points slide.
+        seeming = 1.0 - lines.astray(self.slide[:, 0] * noise[self.order])
         across = self.slide[:, 1] - slope * self.slide[:, 0]
         first = np.hypot(across, _ASTRAY * slide)
         curves = self._on_one_surface(first)
@@ -163,6 +167,7 @@ class RingCurves:
             self.order,
             self._in_cloud(shift),
             self._in_cloud(sigma / first),
+            self._in_cloud(sigma * noise[self.order] / seeming),
             self._in_cloud(curves._redundant(first)),
             tuple(used),
         )

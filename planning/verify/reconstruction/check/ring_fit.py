@@ -51,6 +51,19 @@ class Lines:
         spread = np.where(good, np.sqrt(wss / det), sigma)
         return cls(one, other, apart, weight, np.stack([w, ws, wss]), good, spread)
 
+    def astray(self, noise: Array) -> Array:
+        """Return what share of places' spread is noise of this deviation [m], (n,).
+
+        A slope b is estimated as (1 - share) b + share c where noise moves points along
+        a slope c (errors in variables). Half at most: beyond there is no slope.
+        """
+        w, ws, wss = self.sums
+        random = own = self.weight * np.square(noise)
+        for at, of in ((self.one, self.other), (self.other, self.one)):
+            random = random + np.bincount(at, own[of], len(own))
+        spread = np.where(self.good, wss - ws * ws / w, 1.0)
+        return np.where(self.good, np.minimum(random / spread, 0.5), 0.0)
+
     def through(self, values: Array) -> tuple[Array, Array]:
         """Return the slope of values (n,) along the ring, and how far lines lie off."""
         w, ws, wss = self.sums
@@ -76,6 +89,7 @@ class RingFit:
         order: Index of the lines' points in the cloud, shape (n,).
         shift: How far each point is from its line along the light [m], shape (n,).
         remaining: Share of its deviation that is left, shape (n,).
+        noise: What is left of noise along the light [m], shape (n,).
         redundant: Whether it lies between better points of other cameras, shape (n,).
         used: The lines of each reach, and for which of their points, (n,), these count
             unless later ones do.
@@ -84,6 +98,7 @@ class RingFit:
     order: Indices
     shift: Array
     remaining: Array
+    noise: Array
     redundant: Mask
     used: tuple[tuple[Mask, Lines], ...]
 
