@@ -138,9 +138,9 @@ class RingCurves:
         """Fit a line through the points near each, of whatever cameras, within reach.
 
         Noise is this share of points' deviations, shape (n,): what a calibration leaves
-        counts in weights, too. With weights ``1 / sigma^2``; of the widest reach at which the estimates of all
-        narrower ones still lie within `_AGREE` deviations (intersecting intervals:
-        Goldenshluger & Nemirovski 1997), so that creases stay.
+        counts in weights, too. With these, ``1 / sigma^2``; of the widest reach at
+        which the estimates of all narrower ones still lie within `_AGREE` deviations
+        (intersecting intervals: Goldenshluger & Nemirovski 1997), so that creases stay.
         """
         slide = np.linalg.norm(self.slide, axis=1)
         lines = self._on_one_surface(slide)._lines(slide)
