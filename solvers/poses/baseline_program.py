@@ -125,6 +125,8 @@ def _run_ipopt(
         | barrier
         | {
             "ipopt.mumps_pivot_order": _AMD,
+            # Permuted, a matrix of duals that diverge fills up: gigabytes, minutes.
+            "ipopt.mumps_permuting_scaling": 0,
             "ipopt.max_iter": _ITERATIONS[problem.elastic],
             "ipopt.tol": 1e-7,
             "ipopt.acceptable_iter": 0,
