@@ -49,12 +49,14 @@ class Aim:
         drawn_m: What drawn rigs of the cameras given reach instead [m], which corrects
             what is predicted; None: not known.
         more: Of what is reachable, share that must be measured beyond the present.
+        most: Cameras at which it isn't worth it any more; None: no such number.
     """
 
     quantile: float
     rms_m: float | None
     drawn_m: float | None = None
     more: float = 0.0
+    most: int | None = None
 
 
 def surer_cameras(
@@ -118,7 +120,7 @@ def surer_cameras(
         fits,
         list(range(n_fixed(scene), first)),
         n_fixed(scene),
-        scene.requirements.max_cameras,
+        min(aim.most or np.inf, scene.requirements.max_cameras or np.inf),
     )
     return tuple(candidates.cameras[c] for c in search.run(start))
 
@@ -143,7 +145,7 @@ class _Search:
     fits: Callable[[Sequence[int]], bool]
     offered: list[int]
     n_existing: int
-    most: int | None
+    most: float
     _done: int = 0
     _squares: NDArray[np.float64] = field(init=False)
 
@@ -157,7 +159,7 @@ class _Search:
         """Return cameras by their columns, no fewer than are given."""
         fewest = len(chosen)
         chosen, now = self._exchanged(chosen, self._short(chosen))
-        while not self._reached(now) and len(chosen) < (self.most or len(chosen) + 1):
+        while not self._reached(now) and len(chosen) < self.most:
             more = self._best(chosen, [*self._by_mean(chosen, _ADDED)])
             if more is None or not _gains(more[1], now):
                 break

@@ -112,12 +112,13 @@ def robustly(planned: Planned) -> Planned:
                 wishes = _tightened(rounds[-1], short, request.wishes)
                 if wishes != request.wishes:
                     request, more = replace(request, wishes=wishes), None
-                elif _projectors_decide(
-                    request, rounds, more := surer(latest[1], aim, clock)
-                ):
-                    clock.say("  the projectors' own errors decide: one projector more")
-                    one_more = 1 + len(rounds[0].plan.projectors)
-                    request = replace(request, least_projectors=one_more)
+                else:
+                    many = _many(request, rounds)
+                    more = surer(latest[1], replace(aim, most=many), clock)
+                    if many and (more is None or len(more.cameras) >= many):
+                        clock.say("  the projectors' own errors decide: one more")
+                        one_more = 1 + len(rounds[0].plan.projectors)
+                        request = replace(request, least_projectors=one_more)
                 if request is not asked:
                     latest = planned(request, clock, keep)
                     if latest[0].document.truncated:
@@ -142,16 +143,17 @@ def robustly(planned: Planned) -> Planned:
     return made
 
 
-def _projectors_decide(
-    request: PlanRequest, rounds: Sequence[_Round], more: PartialPlan | None
-) -> bool:
-    """Whether a projector more is tried, once: cameras don't help, or cost much."""
+def _many(request: PlanRequest, rounds: Sequence[_Round]) -> int | None:
+    """So many cameras, or none that help: a projector more is tried; None: it can't be.
+
+    It is tried once.
+    """
     if request.least_projectors or "rms_m" not in rounds[-1].missed_by:
-        return False
+        return None
     stage, before = rounds[0].partial.stage, rounds[0].plan.cameras
     if larger(stage, stage.projectors, request.wishes.max_projectors) is None:
-        return False
-    return more is None or len(more.cameras) > _MANY * len(before)
+        return None
+    return int(_MANY * len(before)) + 1
 
 
 def _robust(request: PlanRequest, asked: Requirements) -> Robust:
