@@ -20,6 +20,7 @@ from planning.verify.reconstruction.calibration import (
 from planning.verify.reconstruction.check.accuracy import Expected
 from planning.verify.reconstruction.check.result import PairCount
 from planning.verify.reconstruction.cloud import Cloud
+from planning.verify.reconstruction.decode import decode
 from planning.verify.reconstruction.decode.decode import CAUSES, Decoded
 from planning.verify.reconstruction.faults.causes import _dark
 from planning.verify.reconstruction.faults.inaccurate import wrong_roots
@@ -85,6 +86,23 @@ def test_two_projectors_on_at_once_are_named(plan, claims):
     assert said_once(words, found), found
     # A plan that fires them together itself isn't rendered so: its images are apart.
     assert reconstruct(together, seed=0, expected=expected).failures == ()
+
+
+def test_pixels_that_saturate_hide_no_fault_and_are_told_where_there_is_none(
+    plan, claims, monkeypatch
+):
+    """An eighth of the lit pixels; their edges stay."""
+    monkeypatch.setattr(decode, "SATURATED", 180.0)
+    saturates = r"P1 saturates lit pixels, 1\d % in C1"
+
+    def moved(document: dict[str, Any]) -> None:
+        document["cameras"][1]["world_from_device"][0][3] += 2e-3
+
+    found = failures(plan, claims, changed(plan, moved))
+    assert said_once("C2 looks as if it", found), found
+    assert not re.search(saturates, " ".join(found))
+    everywhere = claims | {"predicted": np.ones_like(claims["predicted"])}
+    assert said_once(saturates, failures(plan, everywhere))
 
 
 def test_a_root_disc_of_another_camera_is_named(plan, claims, monkeypatch):

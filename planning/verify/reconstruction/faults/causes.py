@@ -11,8 +11,9 @@ from .supposed import Evidence
 
 # A device whose edges are fewer than this share of what its role gives is all but dark.
 _DARK_SHARE = 0.01
-# More saturated pixels than this share of the lit ones are no highlights.
-_SATURATED_SHARE = 0.02
+# So many of the lit pixels may be saturated by highlights; more are told where nothing
+# else is wrong, and beyond the second share edges are no evidence.
+_HIGHLIGHTS, _BLOWN = 0.05, 0.2
 
 
 def explained(failures: tuple[str, ...], measured: MeasuredClouds) -> tuple[str, ...]:
@@ -25,7 +26,7 @@ def explained(failures: tuple[str, ...], measured: MeasuredClouds) -> tuple[str,
     """
     plan, decoded = measured.plan, measured.decoded
     # Edges of disordered frames, or of two projectors at once, are no evidence.
-    blurred = [*_unordered(measured), *_double_light(measured)]
+    blurred = [*_unordered(measured), *_saturated(measured, _BLOWN)]
     causes = [*blurred, *_dark(measured)]
     remark: str | None = None
     if not blurred:
@@ -33,7 +34,9 @@ def explained(failures: tuple[str, ...], measured: MeasuredClouds) -> tuple[str,
         causes += [in_words(cause, plan) for cause in diagnosed.causes]
         causes += wrong_roots(plan, decoded) if not diagnosed.causes else []
         remark = diagnosed.remark
-    incomplete = where_missing(measured, displaced=bool(causes)) + causes
+    missing = where_missing(measured, displaced=bool(causes))
+    causes = causes or _saturated(measured, _HIGHLIGHTS)
+    incomplete = missing + causes
     inaccurate = causes or [remark or where_inaccurate(plan, measured.cloud)]
     # So `judge` words that something is missing.
     absent = "predicted measured"
@@ -82,14 +85,14 @@ def _dark(measured: MeasuredClouds) -> list[str]:
     return words
 
 
-def _double_light(measured: MeasuredClouds) -> list[str]:
-    """Name projectors that saturate many pixels, and what else lights these."""
+def _saturated(measured: MeasuredClouds, share: float) -> list[str]:
+    """Name projectors that saturate more of the pixels, and what else lights these."""
     plan = measured.plan
     lit_too: dict[tuple[str, ...], list[str]] = {}
     for (p, c), pair in measured.decoded:
         n = pair.n_saturated
         lit = pair.lit_pixels + n
-        if n > _SATURATED_SHARE * lit:
+        if n > share * lit:
             others = lit_twice(measured.supposed, pair.saturated, p, c)
             names = (plan.projectors[p].id, *others)
             seen = f"{100 * n / lit:.0f} % in {plan.cameras[c].id}"
