@@ -26,7 +26,8 @@ def explained(failures: tuple[str, ...], measured: MeasuredClouds) -> tuple[str,
     """
     plan, decoded = measured.plan, measured.decoded
     # Edges of disordered frames, or of two projectors at once, are no evidence.
-    blurred = [*_unordered(measured), *_saturated(measured, _BLOWN)]
+    saturated, blown = _saturated(measured)
+    blurred = [*_unordered(measured), *(saturated if blown else [])]
     causes = [*blurred, *_dark(measured)]
     remark: str | None = None
     if not blurred:
@@ -35,7 +36,7 @@ def explained(failures: tuple[str, ...], measured: MeasuredClouds) -> tuple[str,
         causes += wrong_roots(plan, decoded) if not diagnosed.causes else []
         remark = diagnosed.remark
     missing = where_missing(measured, displaced=bool(causes))
-    causes = causes or _saturated(measured, _HIGHLIGHTS)
+    causes = causes or saturated
     incomplete = missing + causes
     inaccurate = causes or [remark or where_inaccurate(plan, measured.cloud)]
     # So `judge` words that something is missing.
@@ -85,24 +86,30 @@ def _dark(measured: MeasuredClouds) -> list[str]:
     return words
 
 
-def _saturated(measured: MeasuredClouds, share: float) -> list[str]:
-    """Name projectors that saturate more of the pixels, and what else lights these."""
-    plan = measured.plan
+def _saturated(measured: MeasuredClouds) -> tuple[list[str], bool]:
+    """Name projectors that saturate many pixels, and what else lights these.
+
+    And whether that are so many that edges are no evidence.
+    """
+    plan, blown = measured.plan, False
     lit_too: dict[tuple[str, ...], list[str]] = {}
     for (p, c), pair in measured.decoded:
         n = pair.n_saturated
         lit = pair.lit_pixels + n
-        if n > share * lit:
+        if n > _HIGHLIGHTS * lit:
+            blown = blown or n > _BLOWN * lit
             others = lit_twice(measured.supposed, pair.saturated, p, c)
             names = (plan.projectors[p].id, *others)
             seen = f"{100 * n / lit:.0f} % in {plan.cameras[c].id}"
             lit_too.setdefault(names, []).append(seen)
-    return [
+    words = [
         f"{name} saturates lit pixels, {', '.join(seen)}: "
         + (
-            f"{' and '.join(others)} lights them too, on at the same time it adds up"
+            f"{' and '.join(others)} light{'s' * (len(others) == 1)} them too, on at "
+            f"the same time it adds up"
             if others
             else "exposed too long"
         )
         for (name, *others), seen in lit_too.items()
     ]
+    return words, blown
