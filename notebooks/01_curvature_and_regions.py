@@ -155,7 +155,8 @@ for region in regions:
 
 def coloured(regions):
     """A colour for each face: its region, grey where it is in none."""
-    palette = np.vstack([plt.cm.tab10([0, 1, 2, 3, 4, 5, 6, 8, 9]), [[0.82, 0.80, 0.78, 1.0]]])
+    colours = plt.cm.tab10([0, 1, 2, 3, 4, 5, 6, 8, 9])
+    palette = np.vstack([colours, [[0.82, 0.80, 0.78, 1.0]]])
     return palette[np.where(regions.face_region < 0, 9, regions.face_region % 9)]
 
 

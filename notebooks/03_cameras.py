@@ -293,11 +293,11 @@ planned.draw()
 # %% [markdown]
 # Of all sets of four, the one whose smallest baseline is largest was sought, as far as
 # coverage allows. Each row below is a seam of two neighbours, in either order: $d$
-# stays below the $d_{max}$ of (9). Its last column is what sets $\phi_{max}$: incidence,
-# as in the closed form, or the border of an image. Cameras off the level of the drum's
-# middle have other $D_i$ and other planes, so their $d_{max}$ isn't that of the ring.
-# [Baselines](../docs/method/baselines.md) has the signed angles behind $\phi_{max}$,
-# and what the paper leaves open.
+# stays below the $d_{max}$ of (9). Its last column is what sets $\phi_{max}$:
+# incidence, as in the closed form, or the border of an image. Cameras off the level of
+# the drum's middle have other $D_i$ and other planes, so their $d_{max}$ isn't that of
+# the ring. [Baselines](../docs/method/baselines.md) has the signed angles behind
+# $\phi_{max}$, and what the paper leaves open.
 
 # %%
 rows = planned.document.baselines

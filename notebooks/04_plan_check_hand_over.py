@@ -44,7 +44,7 @@ from planning.handover.export.write_exports import write_export
 
 head = sample_head(n_faces=4_000, open_neck=True)
 size = 1e3 * (head.bounds[1] - head.bounds[0])
-f"{len(head.faces)} faces, {size[0]:.0f} x {size[1]:.0f} x {size[2]:.0f} mm"
+print(f"{len(head.faces)} faces, {size[0]:.0f} x {size[1]:.0f} x {size[2]:.0f} mm")
 
 # %% [markdown]
 # ## Plan
@@ -61,8 +61,8 @@ for kind in ("projectors", "cameras"):
     proof = getattr(plan.document.certificates, kind)
     print(
         f"{proof.count} {kind}; at least {proof.candidates.lower_bound} over "
-        f"{proof.candidates.n_candidates} candidates, {proof.continuous.lower_bound} over "
-        f"every pose ({proof.continuous.status})"
+        f"{proof.candidates.n_candidates} candidates, {proof.continuous.lower_bound} "
+        f"over every pose ({proof.continuous.status})"
     )
 plan.coverage_table.round(1)
 
@@ -85,7 +85,7 @@ plan.devices.round(1)
 # longest bars, more pixels won't help, a better calibration will.
 
 # %%
-fig, (left, right) = plt.subplots(1, 2, figsize=(10.0, 3.2), width_ratios=(3, 2))
+fig, (left, right) = plt.subplots(1, 2, figsize=(10.0, 3.2))
 plan.plot("marginal", left)
 plan.plot("sigma", right)
 fig.tight_layout()
@@ -124,9 +124,8 @@ limit = 1e3 * plan.requirements.check.max_p95_m
 fig, ax = plt.subplots(figsize=(7.0, 2.8))
 ax.hist(distances, np.linspace(-0.15, 0.15, 121), color="C0")
 ax.set(xlabel="distance of a measured point from the mesh [mm]", ylabel="points")
-ax.set_title(
-    f"95 % within {np.percentile(np.abs(distances), 95):.3f} mm, {limit:g} asked"
-)
+p95 = np.percentile(np.abs(distances), 95)
+ax.set_title(f"95 % within {p95:.3f} mm, {limit:g} asked")
 fig.tight_layout()
 
 # %% [markdown]
@@ -146,13 +145,9 @@ print(f"{len(doubted.failures)} false claims, the first:\n{doubted.failures[0]}"
 
 # %%
 patterns = plan.patterns(folder / "shown")
-sequence = json.loads((patterns / "sequence.json").read_text())
-shown = sorted((patterns / "P1").glob("*.png")) or sorted(patterns.glob("*P1*.png"))
-Image.fromarray(
-    np.hstack(
-        [np.asarray(Image.open(path).convert("L").reduce(3)) for path in shown[2:5]]
-    )
-)
+shown = sorted((patterns / "P1").glob("*.png"))[2:5]
+frames = [Image.open(path).convert("L").reduce(3) for path in shown]
+Image.fromarray(np.hstack(frames))
 
 # %% [markdown]
 # The builder gets tables: `mounts.csv` to measure by, with distances from four datum
@@ -195,11 +190,10 @@ assert counts.projectors.count == counts.projectors.candidates.lower_bound
 assert counts.cameras.count == counts.cameras.candidates.lower_bound
 assert check.passed
 assert found.passed
-assert np.percentile(np.abs(distances), 95) < limit
+assert p95 < limit
 assert not doubted.passed
-centres = np.array(
-    [d.world_from_device[:3, 3] for d in (*plan.projectors, *plan.cameras)]
-)
+devices = (*plan.projectors, *plan.cameras)
+centres = np.array([device.world_from_device[:3, 3] for device in devices])
 assert np.allclose(mounts[["x_mm", "y_mm", "z_mm"]], 1e3 * centres, atol=0.01)
 target = plan.coverage.target
 assert abs(shares["planned"] - target.measured_m2 / target.area_m2) < 0.01

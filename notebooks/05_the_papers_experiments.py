@@ -17,19 +17,21 @@
 # %% [markdown]
 # # The paper's experiments
 #
-# Section VII of Lee & Krim (2014) shows a box and a face under structured circular light,
-# measured by 2 projectors and 2 cameras about 1 m away, and ends: "Since the experiments
-# are conducted using real objects, the ground truth models are not provided, the
-# reconstruction results cannot be compared to the original object." Here both are
-# simulated from rendered pixels, so that every measured point can be held against the
-# object.
+# Section VII of Lee & Krim (2014) shows a box and a face under structured circular
+# light, measured by 2 projectors and 2 cameras about 1 m away, and ends: "Since the
+# experiments are conducted using real objects, the ground truth models are not
+# provided, the reconstruction results cannot be compared to the original object." Here
+# both are simulated from rendered pixels, so that every measured point can be held
+# against the object.
 #
 # The paper gives resolutions, distances, the number of circles, and what a calibration
-# gave: $f = 8000$ px, image centre $(174, 68)$. Everything else is ours: a box of 120 mm
-# with an edge towards the rig, circles 12 mm apart, the sample head, and where devices
-# stand ([in full](../docs/use/experiments.md)).
+# gave: $f = 8000$ px, image centre $(174, 68)$. Everything else is ours: a box of 120
+# mm with an edge towards the rig, circles 12 mm apart, the sample head, and where
+# devices stand ([in full](../docs/use/experiments.md)).
 
 # %%
+import textwrap
+
 import numpy as np
 
 from planning import load_rig, plan_rig
@@ -59,8 +61,8 @@ as_printed = run_experiment(printed)
 draw_camera_images(as_printed)
 
 # %% [markdown]
-# A lens of 2800 px with its centre in the middle sees the whole box. All that follows is
-# with that one.
+# A lens of 2800 px with its centre in the middle sees the whole box. All that follows
+# is with that one.
 
 # %%
 outcome = run_experiment(box_experiment(variant="fits"))
@@ -71,15 +73,16 @@ draw_camera_images(outcome)
 #
 # $$y_j = M^j x_j, \qquad M^j = M_{in}^j M_{ex}^j \tag{3}$$
 #
-# takes points to pixels. It has no inverse: every point of a ray has the same image, and
-# only the ring says how far away it is. For a camera on the projector's own axis that is
+# takes points to pixels. It has no inverse: every point of a ray has the same image,
+# and only the ring says how far away it is. For a camera on the projector's own axis
+# that is
 #
 # $$z = \frac{f R}{\sqrt{u^2 + v^2}}, \tag{4}$$
 #
-# for any other the ray is cut with the ring's surface. Which ring it is, a coded sequence
-# tells: 8 annuli, 3 bits and their inverses, white, black, and a disc with its inverse
-# that tells the two roots of each ray apart. On the left what one projector and one
-# camera measure, then each camera under both (Fig. 7).
+# for any other the ray is cut with the ring's surface. Which ring it is, a coded
+# sequence tells: 8 annuli, 3 bits and their inverses, white, black, and a disc with its
+# inverse that tells the two roots of each ray apart. On the left what one projector and
+# one camera measure, then each camera under both (Fig. 7).
 
 # %%
 cloud = outcome.union.cloud
@@ -104,10 +107,10 @@ draw_viewpoints(outcome, stage)
 # $$Y = Y_1 \cup Y_2 = Y_1 + Y_2 - (Y_1 \cap Y_2) \tag{7}$$
 #
 # (6) should read $Y_2 = \mathfrak{I} y_2$: points in the frame of the second projector
-# come into that of the first. Poses are known here, so $\mathfrak{I}$ is, and all clouds
-# are in one frame. Where they overlap is found from the light in the images and confirmed
-# by geometry. What several cameras measured of a ring is one curve; a point at a step
-# that nothing confirms goes.
+# come into that of the first. Poses are known here, so $\mathfrak{I}$ is, and all
+# clouds are in one frame. Where they overlap is found from the light in the images and
+# confirmed by geometry. What several cameras measured of a ring is one curve; a point
+# at a step that nothing confirms goes.
 
 # %%
 first, second = outcome.experiment.scanner.projectors
@@ -120,8 +123,8 @@ draw_redundancy(outcome, stage)
 # In mm; `half gap` and `one gap` are the shares of what is lit and seen that have a
 # point within half a ring gap, and one. The last row is the paper's future work,
 # "sampling density determination given the density of previous light sources": rings
-# can't come nearer to each other than images resolve, but a second sequence, whose rings
-# go where the first one's points bend most, doubles the density.
+# can't come nearer to each other than images resolve, but a second sequence, whose
+# rings go where the first one's points bend most, doubles the density.
 
 # %%
 both = double_density(outcome)
@@ -131,12 +134,12 @@ draw_errors(outcome, stage)
 # %% [markdown]
 # ## The face (Fig. 6)
 #
-# "Our experiment used 3 circular patterns whose radii are 1, 2, and 4 inch respectively,
-# and the object is illuminated, with the deformed patterns, is viewed from 2 different
-# positions." With $f = 8000$ px the image holds 160 x 90 mm. The ring of 2 inches is
-# 102 mm across, that of 4 inches 203 mm: they don't fit. `landed` is the share of a
-# ring's circumference that falls on the head at all, `seen` what of it is in a camera's
-# image.
+# "Our experiment used 3 circular patterns whose radii are 1, 2, and 4 inch
+# respectively, and the object is illuminated, with the deformed patterns, is viewed
+# from 2 different positions." With $f = 8000$ px the image holds 160 x 90 mm. The ring
+# of 2 inches is 102 mm across, that of 4 inches 203 mm: they don't fit. `landed` is the
+# share of a ring's circumference that falls on the head at all, `seen` what of it is in
+# a camera's image.
 
 # %%
 face_as_printed = run_experiment(face_experiment())
@@ -148,9 +151,10 @@ draw_camera_images(face_as_printed)
 # %% [markdown]
 # With 2800 px the images hold the rings. Nearly half of the ring of 4 inches is missing
 # all the same: it is wider than the head and passes it by, what the paper calls a false
-# projection. The ring of 2 inches is measured to 0.02 mm. The ring of 1 inch passes below
-# the nose, where the tip hides the lip: beyond a step of depth the next annulus is often
-# the next number, too, and with 4 annuli nothing tells such a false edge from a ring.
+# projection. The ring of 2 inches is measured to 0.025 mm. The ring of 1 inch passes
+# below the nose, where the tip hides the lip: beyond a step of depth the next annulus
+# is often the next number, too, and with 4 annuli nothing tells such a false edge from
+# a ring.
 
 # %%
 face = run_experiment(face_experiment(variant="fits"))
@@ -175,12 +179,14 @@ print("\n".join(cloud_lines(shot.clouds)))
 # %% [markdown]
 # ## Planned, not placed
 #
-# `lee-krim-2014-fits` is the paper's rig with the lens of 2800 px as a preset, each figure
-# marked as read, derived or assumed (`plan rigs show lee-krim-2014-fits --sources`).
-# Placed by hand, the devices above light and see a third of the box from one side.
-# Planned, two projectors stand before opposite corners and light all six faces, no device
-# is wasted on an overlap, and two cameras measure nearly all: a wedge lies on each
-# camera's blind curve, $r \cdot m = 0$.
+# `lee-krim-2014-fits` is the paper's rig with the lens of 2800 px as a preset, each
+# figure marked as read, derived or assumed (`plan rigs show lee-krim-2014-fits
+# --sources`). Placed by hand, the devices above light and see a third of the box from
+# one side. Planned, two projectors stand before opposite corners and light all six
+# faces, no device is wasted on an overlap, and two cameras measure nearly all: a wedge
+# lies on each camera's blind curve, $r \cdot m = 0$. What the check from pixels misses
+# is said first: between so few circles some places are more than a ring gap from any
+# point.
 
 # %%
 planned = plan_rig(
@@ -188,8 +194,9 @@ planned = plan_rig(
     load_rig("lee-krim-2014-fits"),
     max_projectors=2,
     max_cameras=2,
-    check=False,
+    on_miss="return",
 )
+print(textwrap.fill(" ".join(planned.missed), 96))
 surface = planned.coverage.surface
 shares = {
     "placed by hand": outcome.visible,
