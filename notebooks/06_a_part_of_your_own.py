@@ -305,7 +305,10 @@ for device in devices:
     ax.plot(*zip(top, foot, strict=True), ":", color=colour)
     ax.plot(*zip(top, part, strict=True), color=colour, lw=0.8)
     ax.plot(*top, "o", color=colour)
-    ax.annotate(device.id, top, (6, 6), textcoords="offset points", color=colour)
+    paper = {"fc": "white", "ec": "none", "pad": 1.0}
+    ax.annotate(
+        device.id, top, (7, 7), textcoords="offset points", color=colour, bbox=paper
+    )
 ax.set(xlim=(0, WIDTH - 1), ylim=(HEIGHT - 1, -40))
 ax.set_axis_off()
 fig.tight_layout()
