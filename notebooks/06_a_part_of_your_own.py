@@ -13,7 +13,6 @@
 #     name: python3
 # ---
 
-
 # %% [markdown]
 # # A part of your own: from a photo of the bench to a rig file
 #
