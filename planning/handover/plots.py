@@ -47,9 +47,10 @@ def plot_marginal(plan: RigPlan, ax: Axes) -> None:
         if planned in shares:
             ax.plot(planned, shares[planned], "s", ms=11, color=line.get_color())
     ax.set(xlabel="devices (square: as planned)", ylabel="of the target [%]")
-    ax.set_ylim(0.0, 100.0)
+    ax.set_xticks(range(1, 1 + max([1, *lit, *measured])))
+    ax.set_ylim(0.0, 105.0)
     ax.grid(alpha=0.3)
-    ax.legend()
+    ax.legend(loc="lower right")
 
 
 def plot_regions(plan: RigPlan, ax: Axes) -> None:
