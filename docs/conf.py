@@ -1,0 +1,12 @@
+"""The Markdown pages as a site: `sphinx-build -W docs build/docs`."""
+
+project = html_title = "ringrig"
+html_theme = "furo"
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+# What a code host shows of this folder; index.md takes it in.
+exclude_patterns = ["README.md"]
+myst_heading_anchors = 4
+# Pages that exist outside this folder are named, not linked; ones that don't still warn.
+nitpick_ignore_regex = [("myst", "/.*")]
+autodoc_typehints = "description"
+autodoc_member_order = "bysource"
