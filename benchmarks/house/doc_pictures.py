@@ -20,6 +20,7 @@ from benchmarks.pictures import (
     paper_figures,
     paper_pictures,
     triangle_figure,
+    word_pictures,
 )
 from benchmarks.pictures.job import IMAGES, Job
 
@@ -43,6 +44,11 @@ PICTURES: dict[str, Callable[[Job], Image.Image]] = {
     "cells": light_pictures.cells,
     "openness": light_pictures.openness,
     "cost": paper_pictures.cost,
+    "lit": word_pictures.lit,
+    "seen": word_pictures.seen,
+    "measured": word_pictures.measured,
+    "reachable": word_pictures.reachable,
+    "assigned": word_pictures.assigned,
     "report_rig": page_pictures.rig,
     "report_triangle": page_pictures.triangle,
 }
