@@ -22,6 +22,7 @@ from benchmarks.pictures import (
     triangle_figure,
     word_pictures,
 )
+from benchmarks.pictures.drawing import save
 from benchmarks.pictures.job import IMAGES, Job
 
 PICTURES: dict[str, Callable[[Job], Image.Image]] = {
@@ -61,8 +62,7 @@ def main() -> int:
         job = Job(Path(folder))
         for name in names:
             picture = PICTURES[name](job)
-            palette = picture.convert("RGB").quantize()
-            palette.save(IMAGES / f"{name}.png", optimize=True)
+            save(picture, IMAGES / f"{name}.png")
             print(f"{name}: {picture.width} x {picture.height}")
     return 0
 

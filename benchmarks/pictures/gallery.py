@@ -19,20 +19,21 @@ from geometry.files.interchange import to_trimesh
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import box, cylinder, sphere
 
+from .drawing import save
 from .job import IMAGES, ROOT
 
-PAGE = ROOT / "docs" / "gallery.md"
+PAGE, GALLERY = ROOT / "docs" / "gallery.md", IMAGES / "gallery"
 SHAPES = ROOT / "build" / "gallery"
 _REAL = "../shared/data/meshes/"
 _SHOWN = ("OK", "NOT", "MEASURED", "EXACT", "FEWEST", "CHECK", "MISSED")
 _SIZE = (800, 500)
 _HEAD = """# Ten planned parts
 
-Written by `python -m benchmarks.pictures.gallery`, from what each command printed and drew:
-the verdict and four of its lines, and a smaller `rig.png`. Each command also writes
-`NAME-plan/report.html`, the [report](use/report.md) to turn and to click. The sample comes along;
-box, cylinder and ball are shapes that the script makes; the others are published meshes, which
-aren't part of the project.
+Written by `python -m benchmarks.pictures.gallery`: what each command printed, without
+its tables, and what it drew, smaller. Each also writes `NAME-plan/report.html`, the
+[report](use/report.md) to turn and to click. The head comes along; ball, box and
+cylinder are written by the script; the others are published meshes, not part of this
+project.
 """
 
 
@@ -116,9 +117,8 @@ def section(part: Part) -> str:
         raise SystemExit(f"{part.title} ended with {done.returncode}")
     name = part.title.lower()
     folder = re.sub(r"\.\w+$", "", part.mesh.rpartition("/")[2]) + "-plan"
-    picture = Image.open(ROOT / folder / "rig.png").convert("RGB")
-    small = picture.resize(_SIZE, Image.Resampling.LANCZOS).quantize(64)
-    small.save(IMAGES / "gallery" / f"{name}.png", optimize=True)
+    picture = Image.open(ROOT / folder / "rig.png")
+    save(picture.resize(_SIZE, Image.Resampling.LANCZOS), GALLERY / f"{name}.png")
     return "\n".join(
         [
             f"## {part.title}\n",
@@ -158,10 +158,10 @@ def main() -> int:
         if part.title in (sys.argv[1:] or [p.title for p in PARTS]):
             if (ROOT / part.mesh).exists():
                 sections[part.title] = section(part)
-                ordered = [sections[p.title] for p in PARTS if p.title in sections]
-                PAGE.write_text("\n".join([_HEAD, *ordered]), encoding="utf-8")
             else:
                 print(f"{part.title}: {part.mesh} isn't there")
+        ordered = [sections[p.title] for p in PARTS if p.title in sections]
+        PAGE.write_text("\n".join([_HEAD, *ordered]), encoding="utf-8")
     return 0
 
 
