@@ -43,13 +43,17 @@ from .drawing import (
 )
 from .job import Job
 
-_BROWN, _SKY, _TEAL, _PURPLE = (
-    (170, 125, 70),
-    (120, 190, 235),
-    (70, 160, 120),
-    (120, 0, 80),
+_BROWN, _PURPLE, _LILAC = (170, 125, 70), (120, 0, 80), (190, 160, 225)
+_SKY, _TEAL = (120, 190, 235), (70, 160, 120)
+# Parts of causes, what they mean, and their colour.
+_FAILING: tuple[tuple[str, str, Colour], ...] = (
+    ("occlusion", "something stands in between", PINK),
+    ("tangent", "along the direction in which it bends most", _PURPLE),
+    ("incidence", "at too large an angle", _BROWN),
+    ("range", "too near or too far", _LILAC),
+    ("beam", "outside the image", BLUE),
+    ("field", "outside the image", BLUE),
 )
-_LILAC = (190, 160, 225)
 _BEHIND = (1.0, 0.4, 0.2)
 _ROW_PX, _TEXT_PX = 26, 15.0
 
@@ -64,7 +68,7 @@ def lit(job: Job) -> Image.Image:
     projector = job.plan.projectors[0]
     steps = _found(job).light[0]
     return _sheet(
-        job, _limits(job, projector, steps, LIGHT_CAUSES, "lit", LIGHT), projector
+        job, _limits(job, projector, steps, LIGHT_CAUSES, ("lit", LIGHT)), projector
     )
 
 
@@ -72,7 +76,7 @@ def seen(job: Job) -> Image.Image:
     """One camera, likewise; light doesn't count."""
     camera = job.plan.cameras[1]
     return _sheet(
-        job, _limits(job, camera, _sight(job), SIGHT_CAUSES, "seen", _SKY), camera
+        job, _limits(job, camera, _sight(job), SIGHT_CAUSES, ("seen", _SKY)), camera
     )
 
 
@@ -82,7 +86,11 @@ def measured(job: Job) -> Image.Image:
     good = _found(job).pairs[0, 1] == MEASURED
     classes = (
         ("measured by P1 and C2", _TEAL, good),
-        ("lit and seen, and not accurate enough", PINK, light & sight & ~good),
+        (
+            "lit and seen, but the triangle isn't good enough",
+            PINK,
+            light & sight & ~good,
+        ),
         ("lit alone", LIGHT, light & ~sight),
         ("seen alone", _SKY, sight & ~light),
         ("neither", CLAY, ~light & ~sight),
@@ -135,21 +143,18 @@ def _limits(
     device: _Device,
     steps: Steps,
     causes: Sequence[str],
-    word: str,
-    colour: Colour,
+    good: tuple[str, Colour],
 ) -> _Classes:
-    """The classes of one device: good, and the first limit that fails."""
+    """The classes of one device: good, turned away, and the first limit that fails."""
     ray = job.mesh.face_centroids - device.world_from_device[:3, 3]
     away = np.einsum("ij,ij->i", job.mesh.face_normals, ray) >= 0.0
-    good = steps == len(causes)
-    hidden = steps == next(k for k, c in enumerate(causes) if c.endswith("occlusion"))
-    way = "in shadow" if word == "lit" else "hidden behind other surface"
-    return (
-        (f"{word} by {device.id}", colour, good),
-        ("at too large an angle", _BROWN, ~good & ~hidden & ~away),
-        (way, PINK, hidden),
-        ("turned away", CLAY, ~good & ~hidden & away),
-    )
+    first = np.array([*causes, "none"])[steps]
+    failing = [
+        (text, colour, (np.char.find(first, cause) >= 0) & ~away)
+        for cause, text, colour in _FAILING
+    ]
+    fine = (f"{good[0]} by {device.id}", good[1], first == "none")
+    return [("turned away", CLAY, away), *failing, fine][::-1]
 
 
 def _sheet(
