@@ -25,15 +25,16 @@ from .job import IMAGES, ROOT
 PAGE, GALLERY = ROOT / "docs" / "gallery.md", IMAGES / "gallery"
 SHAPES = ROOT / "build" / "gallery"
 _REAL = "../shared/data/meshes/"
-_SHOWN = ("OK", "NOT", "MEASURED", "EXACT", "FEWEST", "CHECK", "MISSED")
+_SHOWN = ("OK", "NOT", "MEASURED", "EXACT", "FEWEST", "MISSED", "HELPS", "CHECK")
 _SIZE = (800, 500)
 _HEAD = """# Ten planned parts
 
 Written by `python -m benchmarks.pictures.gallery`: what each command printed, without
-its tables, and what it drew, smaller. Each also writes `NAME-plan/report.html`, the
-[report](use/report.md) to turn and to click. The head comes along; ball, box and
-cylinder are written by the script; the others are published meshes, not part of this
-project.
+tables and warnings, and what it drew, smaller. A part that misses something stands here
+as well: see [when it says MISSED](howto/missed.md). Each command also writes
+`NAME-plan/report.html`, the [report](use/report.md) to turn and to click. The head comes
+along; ball, box and cylinder are written by the script; the others are published meshes,
+not part of this project.
 """
 
 
@@ -83,13 +84,13 @@ PARTS = (
         "Bust",
         _REAL + "snowden_bust_lo.obj",
         "--size-mm 400 --up y --max-projectors 5",
-        "The mesh states no unit: `--size-mm` says how large the print is.",
+        "A hollow cast: its inside counts as target, too, and nobody can measure that.",
     ),
     Part(
         "Housing",
         _REAL + "tm_ADIS16480.STL",
         "--unit m --max-projectors 5 --rig desktop-pico",
-        "An inertial sensor of 47 mm.",
+        "An inertial sensor of 47 mm, with cavities that no light reaches.",
     ),
     Part(
         "Plate",
