@@ -30,11 +30,11 @@ _SIZE = (800, 500)
 _HEAD = """# Ten planned parts
 
 Written by `python -m benchmarks.pictures.gallery`: what each command printed, without
-tables and warnings, and what it drew, smaller. A part that misses something stands here
-as well: see [when it says MISSED](howto/missed.md). Each command also writes
-`NAME-plan/report.html`, the [report](use/report.md) to turn and to click. The head comes
-along; ball, box and cylinder are written by the script; the others are published meshes,
-not part of this project.
+tables and warnings, and what it drew, smaller. A part that misses something stands
+here as well: see [when it says MISSED](howto/missed.md). Each command also writes
+`NAME-plan/report.html`, the [report](use/report.md) to turn and to click. The head
+comes along; ball, box and cylinder are written by the script; the others are published
+meshes, not part of this project.
 """
 
 
