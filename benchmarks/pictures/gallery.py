@@ -81,10 +81,10 @@ PARTS = (
         "156 mm, open below, and stored inside out.",
     ),
     Part(
-        "Bust",
-        _REAL + "snowden_bust_lo.obj",
-        "--size-mm 400 --up y --max-projectors 5",
-        "A hollow cast: its inside counts as target, too, and nobody can measure that.",
+        "Scan",
+        _REAL + "face_scan_james.obj",
+        "--up y --max-projectors 3",
+        "A scan of a face, open behind: what another scanner saw is a mesh, too.",
     ),
     Part(
         "Housing",
@@ -93,10 +93,10 @@ PARTS = (
         "An inertial sensor of 47 mm, with cavities that no light reaches.",
     ),
     Part(
-        "Plate",
+        "Ring",
         _REAL + "tm_fixed_top.ply",
         "--max-projectors 5 --rig desktop-pico",
-        "A machined plate of 120 mm.",
+        "A machined ring of 120 mm, with slots.",
     ),
     Part(
         "Blade",
