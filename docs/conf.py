@@ -5,6 +5,7 @@ html_theme = "furo"
 # Summaries are 100 columns wide.
 html_theme_options = {"light_css_variables": {"code-font-size": "0.72rem"}}
 highlight_language = "text"
+html_show_copyright = False
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 # What a code host shows of this folder; index.md takes it in.
 exclude_patterns = ["README.md"]
