@@ -20,7 +20,9 @@ from benchmarks.pictures import (
     paper_figures,
     paper_pictures,
     triangle_figure,
+    word_pictures,
 )
+from benchmarks.pictures.drawing import save
 from benchmarks.pictures.job import IMAGES, Job
 
 PICTURES: dict[str, Callable[[Job], Image.Image]] = {
@@ -43,6 +45,11 @@ PICTURES: dict[str, Callable[[Job], Image.Image]] = {
     "cells": light_pictures.cells,
     "openness": light_pictures.openness,
     "cost": paper_pictures.cost,
+    "lit": word_pictures.lit,
+    "seen": word_pictures.seen,
+    "measured": word_pictures.measured,
+    "reachable": word_pictures.reachable,
+    "assigned": word_pictures.assigned,
     "report_rig": page_pictures.rig,
     "report_triangle": page_pictures.triangle,
 }
@@ -55,8 +62,7 @@ def main() -> int:
         job = Job(Path(folder))
         for name in names:
             picture = PICTURES[name](job)
-            palette = picture.convert("RGB").quantize()
-            palette.save(IMAGES / f"{name}.png", optimize=True)
+            save(picture, IMAGES / f"{name}.png")
             print(f"{name}: {picture.width} x {picture.height}")
     return 0
 

@@ -1,5 +1,7 @@
 """How the pictures of the documentation are drawn: views, colours, points."""
 
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
@@ -105,6 +107,12 @@ def finished(panel: Panel) -> Image.Image:
     """Return a panel at its final size."""
     size = tuple(side // SUPERSAMPLING for side in panel.view.size)
     return panel.image.resize(size, Image.Resampling.BOX)
+
+
+def save(picture: Image.Image, path: Path) -> None:
+    """Write a picture in 256 colours, rare ones too (the median cut drops them)."""
+    palette = picture.convert("RGB").quantize(method=Image.Quantize.FASTOCTREE)
+    palette.save(path, optimize=True)
 
 
 def beside_each_other(*pictures: Image.Image) -> Image.Image:

@@ -21,14 +21,14 @@ IMAGES = ROOT / "docs" / "images"
 class Job:
     """The sample, planned and measured once; parts are made when they are asked for."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    def __init__(self, folder: Path, *words: str) -> None:
+        self.folder, self.words = folder, words
 
     @cached_property
     def plan(self) -> RigPlan:
-        """The plan of the README's command."""
+        """The plan of the README's command, with a word or two more."""
         mesh = ["--mesh", str(ROOT / "face.obj"), "--max-projectors", "3"]
-        command(*mesh, "--quiet", "-o", str(self.folder))
+        command(*mesh, *self.words, "--quiet", "-o", str(self.folder))
         return RigPlan.load(self.folder / "plan.json")
 
     @property
