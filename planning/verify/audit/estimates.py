@@ -87,6 +87,18 @@ def share_error(count: Array, n: int, n_claimed: int) -> Array:
     return np.sqrt(p * (1.0 - p) * (1.0 / n + 1.0 / max(n_claimed, 1)))
 
 
+def pooled_error(count: float, n: int, claimed: float, n_claimed: float) -> float:
+    """Return the standard error of the difference of a claimed share and one's own.
+
+    Of the share of both samples together, n of the audit's, `count` of which are
+    successes, and n_claimed of the plan's: of a handful either may have none. One
+    success and one failure are added, as in `Estimator.tolerance`.
+    """
+    p = (count + claimed * n_claimed + 1.0) / (n + n_claimed + 2.0)
+    p = min(max(p, 0.0), 1.0)
+    return float(np.sqrt(p * (1.0 - p) * (1.0 / n + 1.0 / n_claimed)))
+
+
 def _variance(share: float, n: int) -> float:
     p = (n * share + 1.0) / (n + 2.0)
     return max(p * (1.0 - p), 0.0) / n

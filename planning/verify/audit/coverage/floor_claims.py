@@ -16,7 +16,7 @@ from planning.model.document.coverage_records import (
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.audit_samples import AuditSamples, draw_region
-from planning.verify.audit.estimates import POINT, ROUNDING, share_error
+from planning.verify.audit.estimates import POINT, ROUNDING, pooled_error
 from planning.verify.audit.predicates.predicates import (
     LIGHT_CAUSES,
     PAIR_CAUSES,
@@ -149,9 +149,9 @@ def _audit_coverage(
         )
     }
     for name, (area, mask) in masks.items():
-        count = np.array(mask.sum())
-        slack = POINT + 4.0 * float(share_error(count, n, n_claimed))
-        findings.number(name, area, whole * float(count) / n, slack * whole)
+        count = float(mask.sum())
+        error = pooled_error(count, n, area / whole, max(n_claimed, 1))
+        findings.number(name, area, whole * count / n, (POINT + 4.0 * error) * whole)
 
 
 def _by_cause(cause: Ints) -> Iterator[tuple[str, Mask]]:

@@ -10,7 +10,7 @@ from planning.model.surface import Surface
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.audit_samples import AuditSamples, samples_at_centroids
-from planning.verify.audit.estimates import POINT, ROUNDING
+from planning.verify.audit.estimates import POINT, ROUNDING, pooled_error
 from planning.verify.audit.predicates.predicates import OCCLUDED, light_steps
 from planning.verify.audit.predicates.recompute import light_of_plan
 
@@ -176,8 +176,7 @@ def _audit_fraction(
     fraction = float(case.actual.lit[inside].mean())
     share = case.estimator.area(inside) / case.estimator.target_m2
     n_claimed = max(case.estimator.n_claimed * share, 1.0)
-    p = (fraction * n + value * n_claimed + 1.0) / (n + n_claimed + 2.0)
-    error = float(np.sqrt(p * (1.0 - p) * (1.0 / n + 1.0 / n_claimed)))
+    error = pooled_error(fraction * n, n, value, n_claimed)
     findings.number(key, value, fraction, POINT + 4.0 * error, "")
 
 

@@ -25,8 +25,9 @@ from .ring_grid import (
     strays,
 )
 
-# Of the chords, poses rounded after rings were spaced may turn so many.
-_STRAY_SLACK = 0.005
+# Of the chords so many are told otherwise by poses rounded after rings were spaced, and
+# by other rays: on rough skin one in a hundred.
+_STRAY_SLACK = 0.01
 # Rays of a ring are told from the next gap by taking them from just inside it.
 _INSIDE = 1.0 - 1e-9
 # Rays of a ring that rounding may turn at limits and outlines, and written digits.
