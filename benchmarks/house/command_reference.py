@@ -21,21 +21,17 @@ Made from `plan --help` by `python -m benchmarks.house.command_reference`.
 def reference() -> str:
     """Return the page."""
     parts = [_HEAD, _section("plan", commands, None)]
-    parent = click.Context(commands, info_name="plan")
+    parent = click.Context(commands, info_name="plan", **commands.context_settings)
     for name in commands.list_commands(parent):
         parts.append(_section(f"plan {name}", commands.commands[name], parent))
     return "\n".join(parts)
 
 
 def _section(title: str, command: click.Command, parent: click.Context | None) -> str:
-    with click.Context(
-        command,
-        info_name=title.split()[-1],
-        parent=parent,
-        terminal_width=96,
-        max_content_width=96,
-        show_default=True,
-    ) as context:
+    settings = {"terminal_width": 96, "max_content_width": 96, "show_default": True}
+    settings = command.context_settings | settings
+    name = title.split()[-1]
+    with click.Context(command, info_name=name, parent=parent, **settings) as context:
         return f"## `{title}`\n\n```\n{command.get_help(context)}\n```\n"
 
 

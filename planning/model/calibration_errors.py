@@ -51,6 +51,10 @@ class CalibrationErrors:
 PERFECT = CalibrationErrors()
 
 
+# No focal length is off by a larger share; drawn ones stay positive.
+MOST_FOCAL = 0.1
+
+
 @dataclass(frozen=True)
 class Mounting:
     """How far devices may stand beside their planned poses; known once calibrated.

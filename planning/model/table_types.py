@@ -146,7 +146,10 @@ def fault_words(fault: ErrorDetails, *, unknown: str, remedy: str) -> str:
         remedy: What to do about a value that breaks a rule.
     """
     where = "".join(
-        f"[{key}]" if isinstance(key, int) else f".{key}" for key in fault["loc"]
+        f"[{key}]" if isinstance(key, int) else f".{key}"
+        for key in fault["loc"]
+        # Which of several types a value was read as is a word of pydantic's own.
+        if isinstance(key, int) or key.isidentifier()
     ).removeprefix(".")
     if fault["type"] == "missing":
         return f"`{where}` is missing; write it"

@@ -2,6 +2,8 @@
 
 import json
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import planning
@@ -15,9 +17,10 @@ def _page(name):
     return (DOCS / name).read_text(encoding="utf-8")
 
 
-def test_command_reference_is_what_help_says(benchmark_module):
-    made = benchmark_module("house.command_reference")
-    assert _page("reference/command-line.md") == made.reference()
+def test_command_reference_is_what_help_says():
+    # In a process of its own: click keeps a command's first `--help`, whoever asked.
+    check = ["-m", "benchmarks.house.command_reference", "--check"]
+    assert subprocess.run([sys.executable, *check], cwd=DOCS.parent).returncode == 0
 
 
 def test_library_reference_names_all_that_is_public():

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from planning.cli.console import PlanFile, Share, output_options, run, threads_option
+from planning.model.calibration_errors import MOST_FOCAL
 
 _LENGTHS = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0}
 _ANGLES = {"deg": math.pi / 180.0, "mrad": 1e-3, "rad": 1.0}
@@ -62,7 +63,10 @@ class Quantities(click.ParamType):  # pyright: ignore[reportMissingTypeArgument]
         for kind, units in self._kinds.items():
             if unit in units:
                 if not (math.isfinite(number) and number >= 0.0):
-                    self.fail(f"{word!r} must be 0 or more.", param, ctx)
+                    self.fail(f"{word!r} must be 0 or more, and finite.", param, ctx)
+                if kind == "focal" and number * units[unit] > MOST_FOCAL:
+                    most = f"{100 * MOST_FOCAL:g} %"
+                    self.fail(f"{word!r} must be at most {most}.", param, ctx)
                 return kind, number * units[unit]
         known = ", ".join(unit for units in self._kinds.values() for unit in units)
         self.fail(

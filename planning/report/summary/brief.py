@@ -19,6 +19,7 @@ from .check_lines import error_words, unchecked
 from .device_lines import axis_name, standing
 from .proof_lines import user_selection
 from .region_lines import worst_region
+from .robust_lines import robust_cost
 from .shortfall import Shortfall, missing
 from .summary import lost_in_field
 from .warning_lines import warnings
@@ -43,6 +44,7 @@ def brief(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
     blocks = [
         *_measured(plan),
         *_fewest(plan),
+        *_robust(plan),
         *_missed(plan, short),
         *_check(plan),
         *_end(plan, files),
@@ -178,6 +180,17 @@ def _fewest(plan: RigPlan) -> Iterator[_Block]:
         return
     for label, (kind, proof) in zip(("FEWEST", ""), kinds.items(), strict=True):
         yield label, _proved(kind, proof), 2
+
+
+def _robust(plan: RigPlan) -> Iterator[_Block]:
+    """Say how many drawn rigs meet what is asked, and what that took."""
+    found = plan.document.robust
+    if found is None:
+        return
+    more = robust_cost(plan)
+    without = f"; {found.n_met_without} without {' and '.join(more)}" if more else ""
+    met = f"{found.n_met} of {found.n_drawn} drawn rigs meet what is asked"
+    yield "ROBUST", f"{met}{without} (plan show --all)", 1
 
 
 def _over_all(proof: Certificate) -> bool:

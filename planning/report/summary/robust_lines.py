@@ -10,6 +10,21 @@ from planning.report.tolerance.tolerance_lines import (
 )
 
 
+def robust_cost(plan: RigPlan) -> list[str]:
+    """Return how many devices of each kind the plan has beyond the one without."""
+    found = plan.document.robust
+    if found is None:
+        return []
+    return [
+        f"{count_words(now - before, kind)} more"
+        for kind, now, before in (
+            ("projector", len(plan.projectors), found.n_projectors_without),
+            ("camera", len(plan.cameras), found.n_cameras_without),
+        )
+        if now != before
+    ]
+
+
 def robust_lines(plan: RigPlan) -> list[str]:
     """Return how many drawn rigs meet what is asked, and what it costs."""
     found, robust = plan.document.robust, plan.requirements.robust
@@ -39,14 +54,6 @@ def robust_lines(plan: RigPlan) -> list[str]:
         )
         if now != before
     ]
-    more = [
-        f"{count_words(now - before, kind)} more"
-        for kind, now, before in (
-            ("projector", len(plan.projectors), found.n_projectors_without),
-            ("camera", len(plan.cameras), found.n_cameras_without),
-        )
-        if now != before
-    ]
     lines = [
         f"{found.n_met} of {found.n_drawn} drawn rigs meet what is asked, "
         f"{percent(robust.quantile)} must ({found.least} of them make that as good as "
@@ -58,7 +65,7 @@ def robust_lines(plan: RigPlan) -> list[str]:
         lines.append(f"planned for {', '.join(tighter)}")
     if found.rounds:
         lines.append(
-            f"costs {' and '.join(more) or 'no device more'}; without it "
+            f"costs {' and '.join(robust_cost(plan)) or 'no device more'}; without it "
             f"{found.n_met_without} of {found.n_drawn} rigs met it{missed_without}"
         )
     return labelled("ROBUST", lines)

@@ -12,10 +12,15 @@ Where no mounting will do, the calibration is at fault: its scale is sought like
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
-from math import ceil
+from math import ceil, inf
 
 from geometry.parallel import mapped
-from planning.model.calibration_errors import PERFECT, CalibrationErrors, Mounting
+from planning.model.calibration_errors import (
+    MOST_FOCAL,
+    PERFECT,
+    CalibrationErrors,
+    Mounting,
+)
 from planning.model.progress import Report
 
 from .asked import Asked
@@ -109,15 +114,19 @@ def loosest(
 ) -> Loosest:
     """Return the largest scale of a mounting that so many of n rigs meet, twice."""
 
-    def sought(at: _At, words: str) -> tuple[float, int]:
+    def sought(at: _At, words: str, focal: float) -> tuple[float, int]:
         each = [
             _Scales(at, asked, n=n, seed=seed, stream=stream, threads=threads)
             for stream in (DRAWN, CONFIRMING)
         ]
-        return _largest(each, ceil(quantile * n), lambda s: report(words.format(s)))
+        most = MOST_FOCAL / focal if focal else inf
+        least = ceil(quantile * n)
+        return _largest(each, least, most, lambda s: report(words.format(s)))
 
     scale, n_met = sought(
-        lambda scale: (case, mounting.times(scale)), "mounting {:.3g} times as loose"
+        lambda scale: (case, mounting.times(scale)),
+        "mounting {:.3g} times as loose",
+        mounting.focal,
     )
     found = Loosest(
         scale,
@@ -138,6 +147,7 @@ def loosest(
     scale, n_met = sought(
         calibrated,
         "mounted as stated, errors of the calibration {:.3g} times as large",
+        case.calibration.focal,
     )
     return replace(
         found,
@@ -148,11 +158,13 @@ def loosest(
 
 
 def _largest(
-    rigs: list[_Scales], least: int, report: Callable[[float], None]
+    rigs: list[_Scales], least: int, most: float, report: Callable[[float], None]
 ) -> tuple[float, int]:
     """The largest scale that so many of either rigs meet, and how many of all do."""
 
     def enough(scale: float) -> bool:
+        if scale > max(most, 1.0):
+            return False
         report(scale)
         return all(each.enough(scale, least) for each in rigs)
 

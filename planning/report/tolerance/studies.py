@@ -7,6 +7,7 @@ A file holds the studies of one plan; those of a plan before it leave the file.
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -93,8 +94,11 @@ def _entries(content: bytes) -> Sequence[Mapping[str, Any]]:
 
 
 def _read(entry: Mapping[str, Any]) -> Study:
-    columns = entry["columns"]
+    columns, rows = entry["columns"], entry["rigs"]
+    for value in (each for row in rows for each in row if each is not None):
+        if not isinstance(value, int | float) or not isfinite(value):
+            raise ValueError
     return Study(
-        tuple(Figures(**dict(zip(columns, row, strict=True))) for row in entry["rigs"]),
+        tuple(Figures(**dict(zip(columns, row, strict=True))) for row in rows),
         tuple(Sensitivity(**one) for one in entry["sensitivities"]),
     )

@@ -49,8 +49,12 @@ def board_lines(plan: RigPlan, found: BoardPlan) -> list[str]:
         "moves afterwards: allow for it by --mark-px, and measure a known part"
     ]
     if not found.suffices:
+        alone = float(np.quantile(found.points.noise_m, 0.95))
         leaves.append(
             "NOT ENOUGH: a larger board (--board), or more devices that see it together"
+            if alone <= found.limit_m
+            else f"NOT ENOUGH: 95 % is within {1e3 * alone:.3f} mm by edge noise "
+            f"alone, which no board changes: a larger --accuracy, or another plan"
         )
     return [
         *labelled("IMAGES", told),
