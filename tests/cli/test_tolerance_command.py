@@ -21,6 +21,7 @@ from planning.cli.main import commands
         (["--mount", "0.5%"], "the unit '%'"),
         (["--mount", ""], "write 2mm,0.2deg"),
         (["--focal", "1mm"], "write 0.5%"),
+        (["--focal", "150%"], "'150%' must be at most 10 %"),
         (["--calibrated", "0.05mm,"], "write 0.05mm,0.01deg"),
         (["--draws", "0"], "0 is not in the range"),
         (["--quantile", "95"], "did you mean 95%?"),

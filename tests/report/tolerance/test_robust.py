@@ -11,6 +11,7 @@ from planning.model.calibration_errors import Mounting, Robust
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.progress import Stopwatch
 from planning.report.partial_plan import PlanRequest
+from planning.report.summary.brief import brief
 from planning.report.summary.robust_lines import robust_lines
 from planning.report.summary.shortfall import shortfalls
 from planning.report.tolerance import robust as robust_module
@@ -143,7 +144,9 @@ def test_cameras_are_aimed_lower_until_the_quantile_holds(plan, monkeypatch):
     assert len({k for rigs in planner.drawn for k in rigs}) == 1200 * len(planner.drawn)
     assert record.missed_by_without["coverage"] > 300
     lines = " ".join(robust_lines(made))
-    assert f"{record.n_met} of 1200 drawn rigs meet what is asked" in lines
+    met = f"{record.n_met} of 1200 drawn rigs meet what is asked"
+    assert met in lines
+    assert f"ROBUST   {met}" in brief(made, (), ())
     assert "no device more" in lines
     assert "miss measured / reachable by cameras" in lines
 

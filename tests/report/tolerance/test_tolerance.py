@@ -209,6 +209,18 @@ def test_what_is_drawn_stays_when_a_run_is_interrupted(plan, tmp_path, monkeypat
     assert len(StudyFile(tmp_path / "tolerance.json", question).study.rigs) == 4
 
 
+@pytest.mark.parametrize("value", ['"0.5"', "NaN", "[]"])
+def test_rigs_that_are_no_numbers_are_refused(plan, tmp_path, value):
+    question = question_of(plan, AS_PLANNED, None, 0)
+    path = tmp_path / "tolerance.json"
+    _run(plan, question, tmp_path, 2)
+    document = json.loads(path.read_text())
+    document["studies"][0]["rigs"][1][0] = json.loads(value)
+    path.write_text(json.dumps(document))
+    with pytest.raises(InputError, match="not a file of drawn rigs; move it"):
+        StudyFile(path, question)
+
+
 def test_another_file_is_left_alone(plan, tmp_path):
     path = tmp_path / "tolerance.json"
     path.write_text(json.dumps({"format": "mine"}))
