@@ -143,10 +143,8 @@ def with_little_work() -> Callable[[], AbstractContextManager[None]]:
 
     @contextmanager
     def little() -> Generator[None]:
-        work = _load("little_work")
         with pytest.MonkeyPatch.context() as patch:
-            work.draw_fewer(patch, claims=3000, overlaps=3000)
-            work.bound_roughly(patch)
+            _load("little_work").work_little(patch)
             yield
 
     return little

@@ -26,11 +26,8 @@ VOLATILE = ("created", "command", "timings_s", "cost")
 
 
 # No test of this file is about the number of samples behind claims, nor about bounds.
-LITTLE = (
-    "import pytest\nfrom support import little_work\npatch = pytest.MonkeyPatch()\n"
-)
-LITTLE += "little_work.draw_fewer(patch, claims=3000, overlaps=3000)\n"
-LITTLE += "little_work.bound_roughly(patch)\n"
+LITTLE = "import pytest\nfrom support.little_work import work_little\n"
+LITTLE += "work_little(pytest.MonkeyPatch())\n"
 
 
 def run(*words, cwd, threads=None, before=""):

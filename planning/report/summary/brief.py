@@ -187,7 +187,7 @@ def _robust(plan: RigPlan) -> Iterator[_Block]:
     found = plan.document.robust
     if found is None:
         return
-    more = robust_cost(plan)
+    more = robust_cost(plan, found)
     without = f"; {found.n_met_without} without {' and '.join(more)}" if more else ""
     met = f"{found.n_met} of {found.n_drawn} drawn rigs meet what is asked"
     yield "ROBUST", f"{met}{without} (plan show --all)", 1

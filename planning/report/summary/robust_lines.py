@@ -1,6 +1,7 @@
 """What a plan says of rigs that aren't built exactly as planned."""
 
 from planning.model.calibration_errors import PERFECT
+from planning.model.document.coverage_records import RobustRecord
 from planning.model.plan import RigPlan
 from planning.model.words import count_words, labelled, percent
 from planning.report.tolerance.asked import FIGURES
@@ -10,11 +11,8 @@ from planning.report.tolerance.tolerance_lines import (
 )
 
 
-def robust_cost(plan: RigPlan) -> list[str]:
+def robust_cost(plan: RigPlan, found: RobustRecord) -> list[str]:
     """Return how many devices of each kind the plan has beyond the one without."""
-    found = plan.document.robust
-    if found is None:
-        return []
     return [
         f"{count_words(now - before, kind)} more"
         for kind, now, before in (
@@ -64,8 +62,9 @@ def robust_lines(plan: RigPlan) -> list[str]:
     if tighter:
         lines.append(f"planned for {', '.join(tighter)}")
     if found.rounds:
+        more = robust_cost(plan, found)
         lines.append(
-            f"costs {' and '.join(robust_cost(plan)) or 'no device more'}; without it "
+            f"costs {' and '.join(more) or 'no device more'}; without it "
             f"{found.n_met_without} of {found.n_drawn} rigs met it{missed_without}"
         )
     return labelled("ROBUST", lines)

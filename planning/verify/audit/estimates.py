@@ -83,8 +83,7 @@ def share_error(count: Array, n: int, n_claimed: int) -> Array:
     Of n samples of the audit, `count` of which are successes, and n_claimed samples of
     the plan. One success and one failure are added, as in `Estimator.tolerance`.
     """
-    p = (count + 1.0) / (n + 2.0)
-    return np.sqrt(p * (1.0 - p) * (1.0 / n + 1.0 / max(n_claimed, 1)))
+    return _of_difference((count + 1.0) / (n + 2.0), n, max(n_claimed, 1))
 
 
 def pooled_error(count: float, n: int, claimed: float, n_claimed: float) -> float:
@@ -95,8 +94,12 @@ def pooled_error(count: float, n: int, claimed: float, n_claimed: float) -> floa
     success and one failure are added, as in `Estimator.tolerance`.
     """
     p = (count + claimed * n_claimed + 1.0) / (n + n_claimed + 2.0)
-    p = min(max(p, 0.0), 1.0)
-    return float(np.sqrt(p * (1.0 - p) * (1.0 / n + 1.0 / n_claimed)))
+    return float(_of_difference(np.clip(p, 0.0, 1.0), n, n_claimed))
+
+
+def _of_difference(p: Array, n: int, n_claimed: float) -> Array:
+    """Return the standard error of the difference of two shares about p."""
+    return np.sqrt(p * (1.0 - p) * (1.0 / n + 1.0 / n_claimed))
 
 
 def _variance(share: float, n: int) -> float:
