@@ -3,7 +3,8 @@
 The program is stated in ``cover_problem``. Counts (unit costs) are solved by greedy and
 large-neighbourhood search from above, Lagrangian bound and exact search over tuples
 from below; among the covers of the fewest sets the one of most weight is sought.
-Floors of row sets come after what is required of all (``floors``). Costs, several needs
+Floors of row sets come after what is required of all (``floors``), a stock after both
+(``stocked_counts``). Costs, several needs
 and row sets go to the linear program and HiGHS.
 
 References:
@@ -12,6 +13,7 @@ References:
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,6 +30,7 @@ from .counts import fewest_sets
 from .cover_problem import CoverProblem
 from .floored_counts import fewest_with_floors
 from .heaviest import most_weight
+from .stocked_counts import fewest_in_stock
 
 DEFAULT_BUDGET = 2e9
 
@@ -168,7 +171,11 @@ def solve_cover(
         search = fewest_sets if counting and cover.simple else cheapest_sets
         if counting and cover.floored and cover.without_floors.simple:
             search = fewest_with_floors
-        answer = search(cover, work, seed=seed, max_sets=free, heaviest=heaviest)
+        how: dict[str, Any] = {"seed": seed, "max_sets": free, "heaviest": heaviest}
+        if cover.limited:
+            answer = fewest_in_stock(cover, work, search, **how)
+        else:
+            answer = search(cover, work, **how)
         answer = replace(answer, bound=answer.bound * unit)
         if answer.total_bound is not None:
             answer = replace(answer, total_bound=answer.total_bound * unit)
@@ -228,7 +235,8 @@ def solve_max_coverage(
     selected = np.union1d(fixed, cover.kept[answer.selected])
     warm = np.union1d(fixed, start)
     better = problem.covered_weight(warm) > problem.covered_weight(selected)
-    if better and warm.size <= n_sets and not cover.floored:
+    allowed = warm.size <= n_sets and problem.in_stock(warm)
+    if better and allowed and not cover.floored:
         # Only where sets that stand in for others coincide.
         selected = warm
     covered = problem.covered_weight(selected)

@@ -6,6 +6,7 @@ share the elements among them and each asks for a weight of its own::
     minimise    sum_s c_s x_s
     subject to  sum_s a_es x_s >= r_e y_e            for each element e
                 sum_{e in G_g} w_e y_e >= W_g        for each row set g
+                sum_{s in K_k} x_s <= b_k               for each kind of set k
                 x_s = 1 for s fixed,   x, y in {0, 1}
 
 With a weight W required of all rows together, the W_g are floors beside it::
@@ -14,7 +15,8 @@ With a weight W required of all rows together, the W_g are floors beside it::
 
 W and W_g are absolute weights over frozen rows: a share of "what can be covered" would
 change its meaning with the sets on offer. r_e = 2 keeps what it covers when any set is
-lost; several row sets are several objects on one rig, or regions of one.
+lost; several row sets are several objects on one rig, or regions of one. Kinds of sets
+are models of devices, of each of which a stock holds so many.
 """
 
 from dataclasses import dataclass, field
@@ -38,7 +40,7 @@ MAX_ROWS = 2_000_000
 MAX_SETS = 100_000
 # Beyond this a need can't be told from a mistake, and labels would fill the memory.
 _MAX_NEED = 1_000
-_MAX_ROW_SETS = 10_000
+_MAX_LABELS = 10_000
 # What is within this and its inverse neither vanishes nor overflows.
 _LEAST_COST = 1e-100
 
@@ -65,6 +67,10 @@ class CoverProblem:
             ``required_weight`` are floors of row sets, 0 for none. None: each row set
             has its own requirement and there is no other.
         fixed: Sets that are in every selection (devices that stand already).
+        kinds: Kind of each set, 0, 1, ... n_k - 1, shape (n_s,); default one kind.
+        stock: Sets b_k of each kind that a selection may hold, fixed ones included,
+            shape (n_k,); default any number. With a stock that binds, costs are all the
+            same and every need is 1.
 
     Raises:
         ValueError: On wrong shapes, negative or non-finite numbers, unknown sets, or a
@@ -81,6 +87,8 @@ class CoverProblem:
     row_sets: NDArray[np.int64] = field(default=None)  # type: ignore[assignment]
     required_total: float | None = None
     fixed: NDArray[np.int64] = field(default=())  # type: ignore[assignment]
+    kinds: NDArray[np.int64] = field(default=None)  # type: ignore[assignment]
+    stock: NDArray[np.int64] = field(default=None)  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         covers = _boolean(self.covers)
@@ -93,7 +101,8 @@ class CoverProblem:
                 "costs must be finite and positive, from "
                 f"{_LEAST_COST:g} to {1.0 / _LEAST_COST:g}"
             )
-        row_sets = _row_sets(self.row_sets, n_e)
+        row_sets = _labels("row_sets", self.row_sets, n_e)
+        kinds = _labels("kinds", self.kinds, n_s)
         totals = _sums(weights, row_sets)
         whole = self.required_total
         if whole is not None and not 0.0 <= whole < np.inf:
@@ -110,11 +119,14 @@ class CoverProblem:
             "needs": _needs(self.needs, n_e),
             "row_sets": row_sets,
             "fixed": set_names("fixed", self.fixed, n_s),
+            "kinds": kinds,
+            "stock": _stock(self.stock, kinds),
         }
         for name, value in values.items():
             if isinstance(value, np.ndarray):
                 value.flags.writeable = False
             object.__setattr__(self, name, value)
+        _check_stock(self)
 
     def by_row_set(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the sums of elements' values over each row set, shape (n_g,)."""
@@ -134,6 +146,11 @@ class CoverProblem:
     def unit_costs(self) -> bool:
         """Whether every set costs the same, so that counting decides."""
         return bool(np.all(self.costs == self.costs[:1]))
+
+    def in_stock(self, selected: NDArray[np.int64]) -> bool:
+        """Return whether the stock of every kind holds what is selected of it."""
+        taken = np.bincount(self.kinds[selected], minlength=self.stock.size)
+        return bool(np.all(taken <= self.stock))
 
     def covered_weights(self, selected: ArrayLike) -> NDArray[np.float64]:
         """Return the weight that known sets cover in each row set, shape (n_g,)."""
@@ -202,17 +219,41 @@ def _needs(numbers: ArrayLike, n: int) -> NDArray[np.int64]:
     return np.broadcast_to(needs, (n,)).copy()
 
 
-def _row_sets(numbers: ArrayLike | None, n: int) -> NDArray[np.int64]:
-    row_sets = (
-        np.zeros(n, dtype=np.int64)
-        if numbers is None
-        else whole_numbers("row_sets", numbers)
+def _labels(name: str, numbers: ArrayLike | None, n: int) -> NDArray[np.int64]:
+    labels = (
+        np.zeros(n, dtype=np.int64) if numbers is None else whole_numbers(name, numbers)
     )
-    if row_sets.shape != (n,):
-        raise ValueError(f"row_sets must be ({n},), got {row_sets.shape}")
-    if not np.all((row_sets >= 0) & (row_sets < _MAX_ROW_SETS)):
-        raise ValueError(f"row_sets must be from 0 to {_MAX_ROW_SETS - 1}")
-    return row_sets
+    if labels.shape != (n,):
+        raise ValueError(f"{name} must be ({n},), got {labels.shape}")
+    if not np.all((labels >= 0) & (labels < _MAX_LABELS)):
+        raise ValueError(f"{name} must be from 0 to {_MAX_LABELS - 1}")
+    return labels
+
+
+def _stock(
+    numbers: ArrayLike | None, kinds: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    n_kinds = int(kinds.max(initial=0)) + 1
+    if numbers is None:
+        return np.full(n_kinds, kinds.size)
+    stock = whole_numbers("stock", numbers)
+    if stock.shape != (n_kinds,) or not np.all(stock >= 0):
+        raise ValueError(
+            f"stock must be ({n_kinds},), at least 0 for each kind, got {numbers}"
+        )
+    return np.minimum(stock, kinds.size)
+
+
+def _check_stock(problem: CoverProblem) -> None:
+    kinds, stock = problem.kinds, problem.stock
+    if not problem.in_stock(problem.fixed):
+        raise ValueError(
+            f"fixed sets are more than a stock of {stock.tolist()} of their kinds holds"
+        )
+    if np.all(stock >= np.bincount(kinds, minlength=stock.size)):
+        return
+    if not problem.unit_costs or np.any(problem.needs > 1):
+        raise ValueError("a stock that binds takes equal costs and needs of 1")
 
 
 def _required(

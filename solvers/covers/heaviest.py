@@ -3,7 +3,9 @@
 From below: greedy, then swaps (`neighbourhood`). From above: Lagrangian bound, then
 exact search, over pairs or over groups of alike sets; where floors of row sets aren't
 met by that, the same at prices of the row sets; where rows have several needs or row
-sets, HiGHS' branch and bound. Each spends a share of one counted budget.
+sets, HiGHS' branch and bound. Each spends a share of one counted budget. Where a stock
+binds, exact searches leave it out: what they find counts where it is in stock, what
+they refute is refuted all the same.
 """
 
 from collections.abc import Callable
@@ -29,6 +31,7 @@ from solvers.status import SolveStatus, WorkBudget
 
 from .answers import (
     FLOORS_COUNTED,
+    IN_STOCK,
     INTEGER_PROOF,
     NONE,
     Answer,
@@ -59,6 +62,8 @@ def most_weight(
     n_sets = min(n_sets, cover.n_sets)
     if n_sets == 0:
         return Answer(SolveStatus.OPTIMAL, NONE, 0.0, "no set is allowed")
+    if cover.limited:
+        return _of_stock(cover, n_sets, budget, seed, start)
     if cover.floored and cover.without_floors.simple:
         return _of_floored(cover, n_sets, budget, seed, start)
     best = NONE
@@ -170,6 +175,53 @@ def _of_floored(
     upper = max(weight, min(free.bound, answer.upper_bound)) if met else free.bound
     proof = cut_short(free.proof, budget)
     return Answer(SolveStatus.FEASIBLE, best, upper, proof, free.bound)
+
+
+def _of_stock(
+    cover: ReducedCover,
+    n_sets: int,
+    budget: WorkBudget,
+    seed: int,
+    start: NDArray[np.int64],
+) -> Answer:
+    """Most weight of sets in stock, under the bounds of any and of those in stock."""
+    part = budget.part(0.5 * budget.units)
+    free = most_weight(cover.without_stock, n_sets, part, seed=seed, start=start)
+    if np.all(cover.left(free.selected) >= 0):
+        return free
+    kicks, best = budget.part(0.5 * budget.remaining), NONE
+    firsts = (cover.in_stock(free.selected), cover.in_stock(start), ())
+    for first in dict.fromkeys(firsts):
+        known = np.array(first, dtype=np.int64)
+        filled = greedy(cover, known, budget, n_sets=n_sets)
+        swapped = most_coverage(
+            cover,
+            filled,
+            kicks,
+            target=cover.total,
+            seed=seed,
+            max_moves=moves(n_sets),
+        )
+        if cover.floored:
+            swapped = min(
+                swapped,
+                least_shortage(cover, swapped, kicks, seed)[0],
+                key=lambda s: lack(cover, s),
+            )
+        best = min(best, swapped, key=lambda s: lack(cover, s))
+    alone = cover.without_floors if cover.floored else cover
+    weight, upper, proof = cover.weight_of(best), free.bound, free.proof
+    least = max(cover.grain, np.floor(cover.total * 1e-11))
+    part = budget.part(budget.remaining)
+    multipliers = tighten(alone, n_sets, weight + least, alone.weights, part)
+    bound = float(coverage_bounds(alone, multipliers)[: n_sets + 1][-1])
+    if bound < upper:
+        upper, proof = bound, IN_STOCK
+    met = cover.meets(best) or not cover.floored
+    if met and upper < weight + least:
+        return Answer(SolveStatus.OPTIMAL, best, weight, proof, free.total_bound)
+    proof = cut_short(proof, budget)
+    return Answer(SolveStatus.FEASIBLE, best, upper, proof, free.total_bound)
 
 
 def _of_any(

@@ -19,7 +19,7 @@ from scipy import sparse
 from solvers.status import WorkBudget
 
 from .reductions import ReducedCover
-from .relaxation import rounding
+from .relaxation import costliest, rounding
 
 _LOOK_BACK = 30
 _MEMORY, _FRESH = 0.9, 0.1
@@ -44,7 +44,11 @@ def tighten(
     by_row = by_set.T
 
     def bound(shares: _Array) -> tuple[float, _Array]:
-        paid, sets = _costliest(by_set @ (shares * weights), n_sets)
+        payments = by_set @ (shares * weights)
+        top = costliest(cover, payments)[:n_sets]
+        sets = np.zeros(payments.size)
+        sets[top] = 1.0
+        paid = float(payments[top].sum())
         others = float(np.sum(weights - shares * weights))
         return (others + paid) * (1.0 + rounding(weights.size)), sets
 
@@ -75,11 +79,3 @@ def tighten(
             if lowest - target > 20.0 * gain:
                 break
     return best * weights
-
-
-def _costliest(payments: _Array, n_sets: int) -> tuple[float, _Array]:
-    """Return what the K costliest sets pay, and their indicator."""
-    top = np.argsort(-payments, kind="stable")[:n_sets]
-    sets = np.zeros(payments.size)
-    sets[top] = 1.0
-    return float(payments[top].sum()), sets

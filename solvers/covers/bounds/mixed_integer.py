@@ -1,7 +1,8 @@
 """Covers as linear and mixed-integer programs for HiGHS, over plain arrays.
 
     minimise c x   subject to   A x >= r y,  w_g y >= W_g for each row set g,
-                                w y >= W,  1 x <= K,  0 <= y <= 1,  x binary
+                                w y >= W,  1 x <= K,  0 <= y <= 1,  x binary,
+                                1 x_k <= b_k for each kind k of which a stock binds
 
 or with the largest w y as the aim. One thread and limits on iterations and nodes, so
 that the answer doesn't depend on the machine. What comes back is a proposal: selections
@@ -165,11 +166,16 @@ def _model(
             [np.zeros(n_s), -weights] if heaviest else [cost, np.zeros(n_e)]
         )
     upper = np.full(lower.size, highspy.kHighsInf)
-    if max_sets is not None:
-        ones = np.zeros((1, cost.size))
-        ones[0, :n_s] = 1.0
-        link = _stack([[link], [sparse.csr_array(ones)]])
-        lower, upper = np.append(lower, 0.0), np.append(upper, float(max_sets))
+    limits = [(np.ones(n_s), n_s if max_sets is None else max_sets)]
+    if cover.limited:
+        kinds = enumerate(cover.stock.tolist())
+        limits += [(cover.kinds == kind, stock) for kind, stock in kinds]
+    for members, most in limits:
+        if members.sum() > most:
+            ones = np.zeros((1, cost.size))
+            ones[0, :n_s] = members
+            link = _stack([[link], [sparse.csr_array(ones)]])
+            lower, upper = np.append(lower, 0.0), np.append(upper, float(most))
     lp = row_program(cost, link, lower, upper)
     if integer:
         whole, free = highspy.HighsVarType.kInteger, highspy.HighsVarType.kContinuous

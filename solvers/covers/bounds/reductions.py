@@ -3,7 +3,7 @@
 Valid for partial cover: equal rows merge with added weight; column j goes if r columns
 that stay each serve all that j serves and cost no more, r the largest need among j's
 rows: wherever j is taken, one of them is free to take its place, or all are taken and j
-adds nothing. Row dominance is *not* valid for partial cover and isn't used here. Fixed
+adds nothing. Where a kind's stock binds, its columns stand in only for their own. Row dominance is *not* valid for partial cover and isn't used here. Fixed
 sets are taken out with what they serve; rows that too few sets serve are lost.
 
 Weights become integers below 2^52 (a power of two times the given ones, rounded), kept
@@ -50,6 +50,8 @@ class ReducedCover:
         kept: The caller's index of each set, increasing, shape (n_s,).
         stand_in: For each of the caller's sets the set here that may take its place,
             -1 where it serves nothing.
+        kinds: Kind of each set, shape (n_s,).
+        stock: Sets of each kind that may be taken, shape (n_k,).
     """
 
     problem: CoverProblem
@@ -65,6 +67,8 @@ class ReducedCover:
     settled: float
     kept: NDArray[np.int64]
     stand_in: NDArray[np.int64]
+    kinds: NDArray[np.int64]
+    stock: NDArray[np.int64]
 
     @property
     def n_sets(self) -> int:
@@ -86,6 +90,32 @@ class ReducedCover:
         """The same cover with what is required of all rows alone."""
         one = np.zeros(self.weights.size, dtype=np.int64)
         return replace(self, row_sets=one, quotas=np.array([self.quota]), quota=0.0)
+
+    @cached_property
+    def limited(self) -> bool:
+        """Whether there are more sets of a kind than its stock holds."""
+        there = np.bincount(self.kinds, minlength=self.stock.size)
+        return bool(np.any(there > self.stock))
+
+    @cached_property
+    def without_stock(self) -> "ReducedCover":
+        """The same cover with as many sets of each kind as are wanted."""
+        return replace(self, stock=np.full(self.stock.size, self.n_sets))
+
+    def left(self, selected: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return what sets leave of each kind's stock, shape (n_k,)."""
+        taken = np.bincount(self.kinds[selected], minlength=self.stock.size)
+        return self.stock - taken
+
+    def in_stock(self, sets: NDArray[np.int64]) -> tuple[int, ...]:
+        """Return of some sets the first of each kind that the stock holds."""
+        kept: list[int] = []
+        left = self.stock.copy()
+        for s in sets.tolist():
+            if left[self.kinds[s]] > 0:
+                left[self.kinds[s]] -= 1
+                kept.append(s)
+        return tuple(kept)
 
     @property
     def required(self) -> float:
@@ -195,7 +225,12 @@ def reduce_problem(
     dense = np.unpackbits(bits, axis=1, count=costs.size).astype(bool)
     merged = np.bincount(inverse, weights=whole[live], minlength=first.size)
     merged, needs = merged.astype(np.float64), needs[live][first]
-    kept, stand_in = _undominated(dense, merged, needs, costs)
+    stock = problem.stock - np.bincount(
+        problem.kinds[problem.fixed], minlength=problem.stock.size
+    )
+    free = stock >= np.bincount(problem.kinds, minlength=stock.size)
+    own = np.where(free[problem.kinds], -1, problem.kinds)
+    kept, stand_in = _undominated(dense, merged, needs, costs, own)
     by_row = sparse.csr_array(sparse_rows(dense[:, kept]), dtype=np.float64)
     return ReducedCover(
         problem=problem,
@@ -211,6 +246,8 @@ def reduce_problem(
         settled=float(done.sum()),
         kept=kept,
         stand_in=stand_in,
+        kinds=problem.kinds[kept],
+        stock=stock,
     )
 
 
@@ -279,10 +316,12 @@ def _undominated(
     weights: NDArray[np.float64],
     needs: NDArray[np.int64],
     costs: NDArray[np.float64],
+    own: NDArray[np.int64],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the columns that no others make superfluous, and who stands in for each.
 
-    The first are column numbers, increasing; the second count among these.
+    The first are column numbers, increasing; the second count among these. Columns of
+    a kind whose stock binds, `own` >= 0, stand in only for that kind.
     """
     n_sets = dense.shape[1]
     # Weights are whole numbers: their sums don't depend on the order.
@@ -305,6 +344,8 @@ def _undominated(
         rivals = standing[: n_standing if compared < _MOST_COMPARED else 0]
         compared += rivals.size * sketch.shape[1]
         rivals = rivals[costs[order[rivals]] <= costs[order[j]]]
+        kind = own[order[rivals]]
+        rivals = rivals[(kind < 0) | (kind == own[order[j]])]
         rivals = rivals[~np.any(sketch[j] & ~sketch[rivals], axis=1)]
         compared += rivals.size * words.shape[1]
         rivals = rivals[~np.any(words[j] & ~words[rivals], axis=1)]

@@ -37,10 +37,31 @@ def coverage_bounds(
     Multipliers are any numbers, shape (n_e,); clipped into [0, w].
     """
     clipped = np.clip(np.nan_to_num(multipliers), 0.0, cover.weights)
-    payments = np.sort(cover.by_set @ (clipped / cover.needs))[::-1]
+    payments = cover.by_set @ (clipped / cover.needs)
+    payments = payments[costliest(cover, payments)]
     others = float(np.sum(cover.weights - clipped))
-    bounds = others + np.concatenate([[0.0], np.cumsum(payments)])
+    paid = np.full(cover.n_sets + 1, payments.sum())
+    paid[: payments.size + 1] = np.concatenate([[0.0], np.cumsum(payments)])
+    bounds = others + paid
     return np.minimum(bounds * (1.0 + rounding(clipped.size)), cover.total)
+
+
+def costliest(
+    cover: ReducedCover, payments: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """Return the sets by what they pay, (k,), as many of each kind as its stock has.
+
+    The first K of these are the K that pay most.
+    """
+    order = np.argsort(-payments, kind="stable")
+    if not cover.limited:
+        return order
+    kinds = cover.kinds[order]
+    before = np.zeros(order.size, dtype=np.int64)
+    for kind in range(cover.stock.size):
+        of_kind = kinds == kind
+        before[of_kind] = np.arange(int(of_kind.sum()))
+    return order[before < cover.stock[kinds]]
 
 
 def count_bound(cover: ReducedCover, multipliers: NDArray[np.float64]) -> int:
@@ -50,7 +71,9 @@ def count_bound(cover: ReducedCover, multipliers: NDArray[np.float64]) -> int:
     (n_e,); negative ones count as 0.
     """
     usable, _ = _usable(multipliers)
-    paid = np.concatenate([[0.0], np.cumsum(np.sort(cover.by_set @ usable)[::-1])])
+    payments = cover.by_set @ usable
+    payments = payments[costliest(cover, payments)]
+    paid = np.concatenate([[0.0], np.cumsum(payments)])
     slack = rounding(usable.size)
     enough = paid * (1.0 + slack) >= least_service(cover, usable) * (1.0 - slack)
     return int(np.argmax(enough)) if np.any(enough) else cover.n_sets + 1

@@ -31,7 +31,8 @@ def greedy(
     """Return a selection extended by the set of most new weight a unit of cost.
 
     A row that more than one set must serve gives its weight in equal parts. Stops when
-    every row set has what it requires or, if ``n_sets`` is given, at that many sets.
+    every row set has what it requires or, if ``n_sets`` is given, at that many sets; or
+    when nothing is left in stock.
     """
     chosen = [int(s) for s in start]
     counts = cover.served(np.array(chosen, dtype=np.int64))
@@ -48,6 +49,8 @@ def greedy(
             open_rows &= lacking[cover.row_sets]
         gains = cover.by_set @ np.where(open_rows, parts, 0.0)
         gains[chosen] = 0.0
+        if cover.limited:
+            gains[cover.left(np.array(chosen, dtype=np.int64))[cover.kinds] <= 0] = 0.0
         budget.spend(cover.entries)
         best = int(np.argmax(gains / cover.costs if n_sets is None else gains))
         if not gains[best] > 0:
@@ -90,7 +93,10 @@ def most_coverage(
         barred = enters > move
         barred[swaps.chosen] = True
         change, out, into = swaps.best_swap(
-            stay=leaves[swaps.chosen] > move, barred=barred, beyond=most - swaps.covered
+            stay=leaves[swaps.chosen] > move,
+            barred=barred,
+            beyond=most - swaps.covered,
+            sold_out=_sold_out(cover, swaps.chosen) if cover.limited else None,
         )
         if not np.isfinite(change):
             continue
@@ -102,6 +108,13 @@ def most_coverage(
         if swaps.covered > most:
             best, most = list(swaps.chosen), swaps.covered
     return np.array(sorted(best), dtype=np.int64)
+
+
+def _sold_out(cover: ReducedCover, chosen: list[int]) -> NDArray[np.bool_]:
+    """Return which sets, (k, n_s), may not take the place of each chosen one."""
+    leaving = cover.kinds[chosen]
+    empty = cover.left(np.array(chosen, dtype=np.int64)) <= 0
+    return empty[cover.kinds] & (leaving[:, None] != cover.kinds)
 
 
 def prune(cover: ReducedCover, selected: NDArray[np.int64]) -> NDArray[np.int64]:

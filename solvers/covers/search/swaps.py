@@ -92,10 +92,12 @@ class Swaps:
         stay: NDArray[np.bool_] | None = None,
         barred: NDArray[np.bool_] | None = None,
         beyond: float = np.inf,
+        sold_out: NDArray[np.bool_] | None = None,
     ) -> tuple[float, int, int]:
         """Return the largest change in weight, the position that goes, what comes.
 
-        Positions that stay, (k,), and barred sets, (n_s,), count beyond a change.
+        Positions that stay, (k,), and barred sets, (n_s,), count beyond a change; what
+        is sold out for a position, (k, n_s), never does.
         """
         losses = self.regain[np.arange(len(self.chosen)), self.chosen]
         change = self.regain + self.gain - losses[:, None]
@@ -103,6 +105,8 @@ class Swaps:
         if stay is not None and barred is not None:
             tabu = stay[:, None] | barred
             change[tabu & (change <= beyond)] = -np.inf
+        if sold_out is not None:
+            change[sold_out] = -np.inf
         out, into = np.unravel_index(int(np.argmax(change)), change.shape)
         return float(change[out, into]), int(out), int(into)
 
