@@ -196,7 +196,7 @@ def trees_of(
     """Return the planner's cells; without shadows only, where it leaves these out."""
     effort = Effort(finest=finest, aims=aims, maps=finest, budget=1.0, shadows=np.inf)
     names = ("without shadows", "among shadows", "among shadows, finer", "by aim")
-    trees = camera_trees(scene, device, rows, effort)
+    trees = camera_trees(scene, (device,), rows, effort)
     return {
         name: tree
         for name, (tree, shadows) in zip(names, trees, strict=False)

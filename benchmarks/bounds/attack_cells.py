@@ -359,7 +359,7 @@ def tree_of(
     """Return the planner's cells with shadows; None where it would leave them out."""
     effort = Effort(finest=finest, budget=1.0, shadows=np.inf)
     question = BoundQuestion(len(rows), 2, len(rows), rows.samples.weight)
-    bound = bound_projectors(scene, template, rows, question, effort)
+    bound = bound_projectors(scene, (template,), rows, question, effort)
     tree = bound.found.tree
     assert isinstance(tree, DirectionTree | PositionTree)
     return tree if bound.shadows else None
@@ -427,7 +427,7 @@ def _scene(
         mesh, load_rig("default", light), wishes, threads=os.cpu_count() or 1
     )
     ready = prepared(order, Stopwatch())
-    return fitted(ready.scene, ready.template, fit)
+    return fitted(ready.scene, ready.templates[0], fit)
 
 
 def fitted(

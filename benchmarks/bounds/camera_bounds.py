@@ -89,17 +89,19 @@ def _case(
     ready = prepared(order, Stopwatch())
     projectors = widen_margins(ready.scene, first_projectors(ready, Stopwatch()))
     rig = order.rig
-    camera = PlannedCamera("", np.eye(4), rig.camera_device(), body=rig.camera_body())
+    camera = PlannedCamera(
+        "", np.eye(4), rig.camera_device(), body=rig.camera_models[0].body
+    )
     n = rig.n_camera_poses
     try:
         scene = ready.scene.among(projectors)
-        candidates = camera_candidate_views(scene, camera, n)
+        candidates = camera_candidate_views(scene, (camera,), n)
         stage = place_cameras(scene, projectors, candidates).stage
     except InfeasibleLimitsError:
         return len(projectors), "nothing measured", 0
     begin = time.process_time()
     effort = PROVE if given.prove else DEFAULT
-    proof = bound_stage(ready.scene, stage, camera.device, effort).certificate
+    proof = bound_stage(ready.scene, stage, (camera.device,), effort).certificate
     seconds = time.process_time() - begin
     before, bound = stage.certificate.needed, proof.continuous
     assert bound is not None

@@ -148,7 +148,7 @@ def _stage(ready: Prepared, times: int = 1) -> ProjectorStage | None:
     rig = ready.request.rig
     number = times * rig.n_projector_poses
     try:
-        return plan_projectors(ready.scene, ready.template, number, rounds=1)
+        return plan_projectors(ready.scene, ready.templates, number, rounds=1)
     except InfeasibleLimitsError:
         return None
 
@@ -173,7 +173,7 @@ def _cell(ready: Prepared, *, prove: bool) -> tuple[str, int]:
     stage = prove_fewest(
         ready.scene,
         stage,
-        ready.template,
+        ready.templates,
         PROVE if prove else DEFAULT,
     )
     seconds = time.perf_counter() - begin

@@ -206,8 +206,10 @@ def _planned(ready: Prepared) -> tuple[PlannedProjector, ...]:
 
 def _case(rig: Rig, ready: Prepared, projectors: tuple[PlannedProjector, ...]) -> Case:
     scene = ready.scene.among(projectors)
-    camera = PlannedCamera("", np.eye(4), rig.camera_device(), body=rig.camera_body())
-    views = camera_candidate_views(scene, camera, rig.n_camera_poses)
+    camera = PlannedCamera(
+        "", np.eye(4), rig.camera_device(), body=rig.camera_models[0].body
+    )
+    views = camera_candidate_views(scene, (camera,), rig.n_camera_poses)
     target = scene.target_samples(_SAMPLES)
     samples, measured = measured_of(scene, projectors, views, target)
     return Case(rig, scene, projectors, views, samples, measured)
@@ -220,7 +222,9 @@ def _by_program(case: Case) -> tuple[int | None, str]:
     from planning.cameras.paper.paper_route import paper_route
 
     on = BaselineSamples(case.scene, case.projectors, case.samples)
-    cover = candidate_cover(case.scene, case.measured, case.samples)
+    cover = candidate_cover(
+        case.scene, case.measured, case.samples, case.candidates.cameras
+    )
     problem = route_problem(on, case.candidates, cover)
     route = paper_route(problem)
     why = f"{route.best_without_one} of {cover.required}"
@@ -245,7 +249,9 @@ def _by_cover(case: Case) -> tuple[int, int, float]:
     from planning.cameras.camera_cover import candidate_cover
     from planning.proofs.selection import select_fewest
 
-    cover = candidate_cover(case.scene, case.measured, case.samples)
+    cover = candidate_cover(
+        case.scene, case.measured, case.samples, case.candidates.cameras
+    )
     chosen, seconds = _timed(lambda: select_fewest(cover))
     return chosen.needed, chosen.lower_bound, seconds
 
@@ -262,7 +268,7 @@ def _bound(case: Case, count: int) -> int:
     question = BoundQuestion(required, count, len(reached), 1.0)
     device = case.rig.camera_device()
     return int(
-        bound_cameras(case.scene, device, lit, question, DEFAULT).found.lower_bound
+        bound_cameras(case.scene, (device,), lit, question, DEFAULT).found.lower_bound
     )
 
 
@@ -313,7 +319,7 @@ def _old(projectors: Path, name: str) -> int:
         ready,
         tuple(
             replace(
-                ready.template,
+                ready.templates[0],
                 world_from_device=device,
                 world_from_ring=ring,
                 ring_radii=np.array(radii, dtype=np.float64),

@@ -29,11 +29,12 @@ from geometry.mesh.sampling import sample_surface
 from geometry.shapes.sample_head.sample_head import sample_head
 from planning.verify.reconstruction.check.accuracy import Expected, nearest_distance
 from planning.verify.reconstruction.check.result import Reconstruction
+from planning.verify.reconstruction.defocus import Defocus
 from planning.verify.reconstruction.reconstruct import reconstruct
 from planning.verify.reconstruction.render.mitsuba.materials import Surface
 from planning.verify.reconstruction.render.mitsuba.physics import Physics
 from planning.verify.reconstruction.render.photometry import Photometry
-from planning.verify.reconstruction.scanner import Defocus, Scanner
+from planning.verify.reconstruction.scanner import Scanner
 
 _Array = NDArray[np.float64]
 _FALSE_M = 1e-3

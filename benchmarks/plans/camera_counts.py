@@ -137,12 +137,12 @@ class Job:
     def place(self, by: CamerasBy) -> CameraSolution:
         """Place the cameras."""
         rig, ready = self.request.rig, self.ready
-        body = rig.camera_body()
+        body = rig.camera_models[0].body
         camera = PlannedCamera("", np.eye(4), rig.camera_device(), body=body)
         n = rig.n_camera_poses
         with self.clock.stage("cameras", "cameras"):
             scene = ready.scene.among(self.projectors)
-            candidates = camera_candidate_views(scene, camera, n)
+            candidates = camera_candidate_views(scene, (camera,), n)
             return place_cameras(scene, self.projectors, candidates, by)
 
 

@@ -53,7 +53,7 @@ def main() -> int:
     ready = prepared(PlanRequest(mesh, load_rig("default"), wishes), Stopwatch())
     required = replace(ready.scene.requirements, region_share=_SHARE)
     scene = replace(ready.scene, requirements=required)
-    source = CandidateSource(scene, ready.template)
+    source = CandidateSource(scene, ready.templates)
     shell = required.workspace.projector_radius_m[1]
     print(
         "| start | lit by 12,000 samples | "

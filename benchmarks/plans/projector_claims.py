@@ -79,7 +79,7 @@ def _row(ready: Prepared) -> tuple[str, int]:
     number = rig.n_projector_poses
     begin = time.perf_counter()
     try:
-        stage = plan_projectors(scene, ready.template, number)
+        stage = plan_projectors(scene, ready.templates, number)
     except InfeasibleLimitsError:
         return "nothing lit |", 0
     posed = widen_margins(scene, stage)

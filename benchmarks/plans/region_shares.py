@@ -153,7 +153,7 @@ def _print_causes(meshes: Iterator[_Job]) -> None:
         n, large = len(cones), len(ready.scene.large_regions)
         normals, shadows = _directions(ready)
         n_poses = ready.request.rig.n_projector_poses
-        stage = plan_projectors(ready.scene, ready.template, n_poses, rounds=1)
+        stage = plan_projectors(ready.scene, ready.templates, n_poses, rounds=1)
         count = stage.certificate.needed.count
         rows.append((n, large, normals, shadows, count))
         print(

@@ -101,7 +101,7 @@ def _margins(
     scene = ready.scene
     begin = time.perf_counter()
     try:
-        stage = plan_projectors(scene, ready.template, _number(ready))
+        stage = plan_projectors(scene, ready.templates, _number(ready))
     except InfeasibleLimitsError:
         return None
     posed = widen_margins(scene, stage)

@@ -83,7 +83,8 @@ def no_axes_need_fewer(scene: Scene, cover: CameraCover) -> bool:
     for camera, view in enumerate(cover.candidates.on(cover.samples.target)):
         seen[view.samples, camera] = True
     seen &= np.any(cover.measured, axis=1)[:, None]
-    problem = candidate_cover(scene, seen, cover.samples).problem
+    cameras = cover.candidates.cameras
+    problem = candidate_cover(scene, seen, cover.samples, cameras).problem
     bound = solve_cover(problem, seed=scene.seed)
     return bound.lower_bound >= len(cover.cameras)
 
@@ -104,7 +105,7 @@ def standing_axes(
     if axis != "free":
         centred = centred_axes(scene, projectors, margin)
         samples, measured = measured_of(scene, centred, views, target)
-        cover = candidate_cover(scene, measured, samples)
+        cover = candidate_cover(scene, measured, samples, views.cameras)
         if axis == "centred" or cover.enough(np.arange(cover.n_existing)):
             return centred, "centred"
     cameras = views.cameras[: n_fixed(scene)]
@@ -116,27 +117,28 @@ def other_axes(
     scene: Scene,
     solution: CameraSolution,
     cameras: Sequence[PlannedCamera],
-    template: PlannedProjector,
+    templates: Sequence[PlannedProjector],
     margin: float,
 ) -> tuple[PlannedProjector, ...]:
     """Return the projectors with the ring axes that weren't taken, to compare.
 
-    Free axes start from the template's and move for the cameras as they stand.
+    Free axes start from the templates' and move for the cameras as they stand.
     """
     projectors, samples = solution.projectors, solution.stage.cover.samples
     scene = scene.among((*projectors, *cameras))
     if solution.axes == "free":
         return centred_axes(scene, projectors, margin)
     aside = tuple(
-        p if p.keeps_rings else _with_rings_of(p, template) for p in projectors
+        p if p.keeps_rings else _with_rings_of(p, templates) for p in projectors
     )
     free = move_ring_axes(scene, aside, cameras, samples)
     return tuple(without_idle(scene, projector, margin) for projector in free)
 
 
 def _with_rings_of(
-    projector: PlannedProjector, template: PlannedProjector
+    projector: PlannedProjector, templates: Sequence[PlannedProjector]
 ) -> PlannedProjector:
+    (template,) = (t for t in templates if t.model == projector.model)
     frame = projector.world_from_device @ template.world_from_ring
     return replace(projector, world_from_ring=frame, ring_radii=template.ring_radii)
 

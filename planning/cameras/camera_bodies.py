@@ -114,9 +114,8 @@ def resolved_cover(
     interference = CameraInterference.among(
         scene, projectors, samples, cameras, cover.measured
     )
-    selection = resolve_conflicts(
-        interference, candidate_cover(scene, cover.measured, samples), cover.selection
-    )
+    problem = candidate_cover(scene, cover.measured, samples, cameras)
+    selection = resolve_conflicts(interference, problem, cover.selection)
     if not len(selection.chosen):
         raise InfeasibleLimitsError(
             f"each of {len(cameras)} camera bodies collides, or keeps "

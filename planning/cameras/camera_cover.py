@@ -10,6 +10,7 @@ from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.words import area_words
 from planning.proofs.conflicts import Interference
+from planning.proofs.device_stock import DeviceStock
 from planning.proofs.quotas import RegionFloors
 from planning.proofs.selection import CandidateCover, Selection, select_fewest
 from planning.scene.bodies.clearance import candidates_with_clearance
@@ -25,7 +26,7 @@ from planning.scene.measured import (
 from planning.scene.placed_bodies import existing_devices
 from planning.scene.samples import Target, merged
 from planning.scene.scene import Scene
-from planning.scene.workspace.candidates import Candidates
+from planning.scene.workspace.model_candidates import ModelCandidates
 
 _ROUNDS = 3
 
@@ -79,14 +80,17 @@ class CameraCover:
 
 
 def camera_candidate_views(
-    scene: Scene, template: PlannedCamera, n_candidates: int
+    scene: Scene, templates: tuple[PlannedCamera, ...], n_candidates: int
 ) -> CandidateViews:
-    """Return the candidates, existing cameras first: they are in every cover."""
-    required = scene.requirements
-    site = scene.site("camera", template.device)
-    offer = Candidates(template, required.workspace, site)
-    free = candidates_with_clearance(scene, n_candidates, offer.over)
-    return CandidateViews(scene, existing_devices(required, template) + free)
+    """Return the candidates, existing cameras first: they are in every cover.
+
+    So many of each model.
+    """
+    offer = ModelCandidates.over_scene(scene, templates)
+    every = n_candidates * len(templates)
+    free = candidates_with_clearance(scene, every, offer.over)
+    standing = existing_devices(scene.requirements, templates)
+    return CandidateViews(scene, standing + free)
 
 
 def plan_cameras(
@@ -105,7 +109,7 @@ def plan_cameras(
 
     def choose(samples: LitSamples, measured: NDArray[np.bool_]) -> CameraCover:
         selection = select_fewest(
-            candidate_cover(scene, measured, samples), known=known
+            candidate_cover(scene, measured, samples, candidates.cameras), known=known
         )
         return CameraCover(candidates, samples, measured, selection)
 
@@ -133,7 +137,8 @@ def confirmed_cover(
             return cover
         fresh = scene.target_samples(DRAWS.fresh_cameras.later(attempt))
         lit, seen = measured_of(scene, projectors, cover.candidates, fresh)
-        if candidate_cover(scene, seen, lit).enough(cover.selection.chosen):
+        offered = cover.candidates.cameras
+        if candidate_cover(scene, seen, lit, offered).enough(cover.selection.chosen):
             return cover
         target = merged(target, fresh)
         samples = lit_samples(scene, projectors, target)
@@ -174,7 +179,10 @@ def measured_of(
 
 
 def candidate_cover(
-    scene: Scene, measured: NDArray[np.bool_], samples: LitSamples
+    scene: Scene,
+    measured: NDArray[np.bool_],
+    samples: LitSamples,
+    cameras: Sequence[PlannedCamera],
 ) -> CandidateCover:
     """Return what candidates measure, with what is required of cameras.
 
@@ -189,6 +197,7 @@ def candidate_cover(
         max_count=required.max_cameras,
         n_existing=n_fixed(scene),
         regions=RegionFloors.of(scene, samples.target),
+        stock=DeviceStock.of(cameras, required.stock_of("camera")),
     )
 
 

@@ -28,6 +28,7 @@ from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.selection import fewest_count
 from planning.scene.camera_views import CandidateViews
 from planning.scene.scene import Scene
+from planning.scene.workspace.model_candidates import one_of_each
 
 from .camera_baselines import (
     baseline_samples,
@@ -94,7 +95,9 @@ def better_route(
         return cover, _counts(by, cover, why), ()
     route: RouteCameras | None = None
     why = "the cover was asked for"
-    if by == "both":
+    if by == "both" and len(one_of_each(cover.candidates.cameras)) > 1:
+        why = "the paper's route is of cameras of one model"
+    elif by == "both":
         why = "the paper's route found no camera that measures anything"
         try:
             route = route_among(
@@ -211,8 +214,11 @@ def _with_more(
     known = None
     if route.needed is not None and route.needed < needed:
         known = route.by_count[route.needed]
-    elif needed <= fewest_count(candidate_cover(scene, route.measured, cover.samples)):
-        return cover
+    else:
+        cameras = route.candidates.cameras
+        joined = candidate_cover(scene, route.measured, cover.samples, cameras)
+        if needed <= fewest_count(joined):
+            return cover
     again = cover_by_cover(scene, projectors, route.candidates, known)
     if again.selection.needed < needed:
         return again

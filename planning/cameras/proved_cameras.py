@@ -1,5 +1,6 @@
 """The fewest cameras with what is proved of their number, over candidates and all."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -44,7 +45,9 @@ def camera_stage(
     scene: Scene, cover: CameraCover, routes: RouteCounts | None = None
 ) -> CameraStage:
     """Return the cameras of a cover, with the best ones for every other count."""
-    candidates = candidate_cover(scene, cover.measured, cover.samples)
+    candidates = candidate_cover(
+        scene, cover.measured, cover.samples, cover.candidates.cameras
+    )
     others, proof = certified(
         candidates,
         cover.selection,
@@ -57,7 +60,7 @@ def camera_stage(
 
 
 def bound_stage(
-    scene: Scene, stage: CameraStage, device: PinholeModel, effort: Effort
+    scene: Scene, stage: CameraStage, devices: Sequence[PinholeModel], effort: Effort
 ) -> CameraStage:
     """Return the stage with the bound over all poses in its certificate."""
     proof, cover = stage.certificate, stage.cover
@@ -79,5 +82,5 @@ def bound_stage(
         RegionFloors.of(scene, samples.target).take(np.arange(n)),
     )
     lit = taken(samples, wanted, samples.lit)
-    bound = bound_cameras(scene, device, lit, question, effort)
+    bound = bound_cameras(scene, devices, lit, question, effort)
     return replace(stage, certificate=joined(proof, bound.proof()))

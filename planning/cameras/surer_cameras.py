@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.proofs.device_stock import within_stock
 from planning.proofs.quotas import Quotas, RegionFloors
 from planning.scene.bodies.clearance import lacks_clearance, with_clearance
 from planning.scene.draws import DRAWS
 from planning.scene.measured import lit_samples
 from planning.scene.placed_bodies import blocked_by, bodies_of, moves_bodies
 from planning.scene.scene import Scene
-from planning.scene.workspace.candidates import Candidates
+from planning.scene.workspace.model_candidates import ModelCandidates, one_of_each
 
 from .camera_bodies import lit_among
 from .camera_cover import n_fixed
@@ -76,7 +77,7 @@ def surer_cameras(
     scene = scene.among(projectors)
     target = scene.target_samples(DRAWS.surer)
     samples = lit_samples(scene, projectors, target)
-    near = with_clearance(scene, _candidates(scene, cameras[0]).nearest(n_candidates))
+    near = with_clearance(scene, _offer(scene, stage).nearest(n_candidates))
     candidates = stage.cover.candidates.joined((*near, *cameras))
     views = candidates.on(samples.target)
     limits = scene.requirements.triangulation
@@ -91,6 +92,8 @@ def surer_cameras(
 
     def fits(chosen: Sequence[int]) -> bool:
         devices = [candidates.cameras[c] for c in chosen]
+        if not within_stock(devices, scene.requirements.stock_of("camera")):
+            return False
         if not moves_bodies(devices):
             return True
         bodies, points = bodies_of(devices), samples.target.samples.points
@@ -125,10 +128,9 @@ def surer_cameras(
     return tuple(candidates.cameras[c] for c in search.run(start))
 
 
-def _candidates(scene: Scene, like: PlannedCamera) -> Candidates[PlannedCamera]:
-    template = replace(like, existing="")
-    site = scene.site("camera", template.device)
-    return Candidates(template, scene.requirements.workspace, site)
+def _offer(scene: Scene, stage: CameraStage) -> ModelCandidates[PlannedCamera]:
+    """What gives candidates of every model that the stage had."""
+    return ModelCandidates.over_scene(scene, one_of_each(stage.reference))
 
 
 @dataclass(eq=False)

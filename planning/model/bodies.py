@@ -208,6 +208,7 @@ class Existing:
         world_from_ring: Ring frame of a projector whose rings stay, rows [m]; None:
             its rings are planned.
         ring_radii: Of these rings, as in `PlannedProjector`.
+        model: Which of the rig's models it is; empty: the first.
 
     Raises:
         ValueError: If a pose isn't 4 x 4.
@@ -219,6 +220,7 @@ class Existing:
     body: Body | None = None
     world_from_ring: tuple[tuple[float, ...], ...] | None = None
     ring_radii: tuple[float, ...] = ()
+    model: str = ""
 
     def __post_init__(self) -> None:
         for rows in (self.world_from_device, self.world_from_ring or ((0.0,) * 4,) * 4):

@@ -28,6 +28,7 @@ class PlannedProjector:
         pattern: What it shows, as in `Requirements`.
         keeps_rings: Whether its rings stay as they are.
         exposure_s: What cameras expose each of its frames for [s]; None: not planned.
+        model: Which of the rig's models it is; empty where there is one.
     """
 
     id: str
@@ -41,6 +42,7 @@ class PlannedProjector:
     pattern: Literal["rings", "dense", "none"] = "rings"
     keeps_rings: bool = False
     exposure_s: float | None = None
+    model: str = ""
 
 
 def code_bits(n_rings: int) -> int:
@@ -81,6 +83,7 @@ class PlannedCamera:
         device: Its optics.
         existing: Name of the device that stands already; empty: it is planned.
         body: Its housing; None: it takes no room.
+        model: Which of the rig's models it is; empty where there is one.
     """
 
     id: str
@@ -88,3 +91,4 @@ class PlannedCamera:
     device: PinholeModel
     existing: str = ""
     body: Body | None = None
+    model: str = ""

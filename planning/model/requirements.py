@@ -20,7 +20,7 @@ _STANDOFFS = ("projector_standoff_m", "camera_standoff_m")
 _MOUNTS = ("projector_mount", "camera_mount")
 _LEFT_OUT = (*_ZONES, *_STANDOFFS, *_MOUNTS, "origin", "clearance_m")
 # Of an existing device, likewise.
-_OF_ITS_OWN = ("body", "world_from_ring", "ring_radii")
+_OF_ITS_OWN = ("body", "world_from_ring", "ring_radii", "model")
 
 
 @dataclass(frozen=True)
@@ -110,6 +110,15 @@ class CheckLimits:
     min_completeness: float
     max_predicted_missing: float
     ambient: float = 0.05
+
+
+@dataclass(frozen=True)
+class Stock:
+    """How many devices there are of a model; of a `projector` or a `camera`."""
+
+    kind: str
+    model: str
+    count: int
 
 
 @dataclass(frozen=True)
@@ -255,6 +264,7 @@ class Requirements:
             projectors, and measured area / area reachable by cameras; 0: no floor.
         region_share: Regions of at least this share of the target's area have it.
         robust: What drawn rigs must meet, where the rest is tightened for it.
+        stock: Models of which there are so many and no more.
     """
 
     max_projectors: int
@@ -273,6 +283,11 @@ class Requirements:
     region_coverage: float = 0.0
     region_share: float = 0.01
     robust: Robust | None = None
+    stock: tuple[Stock, ...] = ()
+
+    def stock_of(self, kind: str) -> dict[str, int]:
+        """Return how many there are of each counted model of a kind."""
+        return {one.model: one.count for one in self.stock if one.kind == kind}
 
     def existing_of(self, kind: str) -> tuple[Existing, ...]:
         """Return the existing devices that are a `projector` or a `camera`."""
@@ -285,7 +300,7 @@ class Requirements:
         devices = [(device, _OF_ITS_OWN) for device in document["existing"]]
         tables = [
             (document["workspace"], _LEFT_OUT),
-            (document, ("existing", "robust")),
+            (document, ("existing", "robust", "stock")),
             (document["triangulation"], ("light",)),
         ]
         for table, names in devices + tables:

@@ -41,6 +41,11 @@ _OBSTACLES: dict[str, tuple[str, tuple[int | str, ...]]] = {
     "obstacle_faces": ("iu", ("n", 3)),
     "obstacle_of_face": ("iu", ("n",)),
 }
+# Model of each reference pose, where the rig has several.
+_MODELS: dict[str, tuple[str, tuple[int | str, ...]]] = {
+    "reference_projector_models": ("iu", ("n projectors",)),
+    "reference_camera_models": ("iu", ("n cameras",)),
+}
 # Squares and cubes of what is larger by far overflow.
 _LARGEST = 1e9
 _BESIDE_MESH = list(_ARRAYS)[2:]
@@ -72,6 +77,9 @@ class Surface:
         reference_rings: ``world_from_ring`` of the same poses, shape (n, 4, 4).
         reference_cameras: ``world_from_device`` of the reference set, (n, 4, 4).
         obstacles: What stands about the object and isn't a device.
+        reference_projector_models: Model of each of these poses, by its place in the
+            rig, shape (n,); None: all are the first.
+        reference_camera_models: The same of cameras.
 
     Raises:
         PlanFileError: If an array is of another kind of numbers, or of another shape.
@@ -85,13 +93,28 @@ class Surface:
     reference_rings: Array
     reference_cameras: Array
     obstacles: tuple[Obstacle, ...] = ()
+    reference_projector_models: Ints | None = None
+    reference_camera_models: Ints | None = None
 
     def __post_init__(self) -> None:
         sizes: dict[int | str, int] = {
             "n faces": len(self.mesh.faces),
             "n projectors": len(self.reference_projectors),
+            "n cameras": len(self.reference_cameras),
         }
-        _check_arrays({name: getattr(self, name) for name in _BESIDE_MESH}, sizes)
+        beside = {name: getattr(self, name) for name in _BESIDE_MESH}
+        _check_arrays(beside | self._models, sizes)
+
+    def models_of(self, kind: str) -> Ints:
+        """Return the model of each reference pose of a `projector` or a `camera`."""
+        stated = self._models.get(f"reference_{kind}_models")
+        poses = getattr(self, f"reference_{kind}s")
+        return np.zeros(len(poses), dtype=np.int64) if stated is None else stated
+
+    @property
+    def _models(self) -> dict[str, Ints]:
+        models = {name: getattr(self, name) for name in _MODELS}
+        return {name: of for name, of in models.items() if of is not None}
 
     @cached_property
     def in_dominant(self) -> Mask:
@@ -117,6 +140,7 @@ class Surface:
             "faces": self.mesh.faces,
             **{name: getattr(self, name) for name in _BESIDE_MESH},
             **_packed(self.obstacles),
+            **self._models,
         }
         np.savez_compressed(buffer, **arrays)
         return buffer.getvalue()
@@ -148,6 +172,7 @@ class Surface:
                 wanted = _ARRAYS | (
                     _OBSTACLES if set(_OBSTACLES) & set(archive) else {}
                 )
+                wanted |= {name: of for name, of in _MODELS.items() if name in archive}
                 arrays = {name: archive[name] for name in wanted}
         except KeyError as error:
             raise PlanFileError(f"{path}: {error.args[0]}; plan again") from None
@@ -167,7 +192,7 @@ def _check_arrays(
     arrays: Mapping[str, NDArray[Any]], sizes: Mapping[int | str, int]
 ) -> None:
     for name, array in arrays.items():
-        kinds, shape = (_ARRAYS | _OBSTACLES)[name]
+        kinds, shape = (_ARRAYS | _OBSTACLES | _MODELS)[name]
         wanted = [sizes.get(size, size) for size in shape]
         fits = array.ndim == len(wanted) and all(
             want in ("n", has) for want, has in zip(wanted, array.shape, strict=True)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedProjector
+from planning.proofs.device_stock import DeviceStock
 from planning.proofs.quotas import RegionFloors
 from planning.proofs.selection import CandidateCover
 from planning.scene.bodies.clearance import candidates_with_clearance, with_clearance
@@ -17,7 +18,7 @@ from planning.scene.limits import projector_limits
 from planning.scene.placed_bodies import existing_devices, movable
 from planning.scene.samples import Target, merged
 from planning.scene.scene import Scene
-from planning.scene.workspace.candidates import Candidates
+from planning.scene.workspace.model_candidates import ModelCandidates
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,21 +27,22 @@ class CandidateSource:
 
     Attributes:
         scene: Surface and requirements.
-        template: Optics of the projector, and its rings until cameras are known.
+        templates: Optics of each model of projectors, and its rings until cameras are
+            known.
     """
 
     scene: Scene
-    template: PlannedProjector
+    templates: tuple[PlannedProjector, ...]
 
     @cached_property
-    def _offer(self) -> Candidates[PlannedProjector]:
-        site = self.scene.site("projector", self.template.device)
-        return Candidates(self.template, self.scene.requirements.workspace, site)
+    def _offer(self) -> ModelCandidates[PlannedProjector]:
+        return ModelCandidates.over_scene(self.scene, self.templates)
 
     def lattice(self, n: int) -> tuple[PlannedProjector, ...]:
-        """Return existing projectors, and n candidates or more over the workspace."""
-        existing = existing_devices(self.scene.requirements, self.template)
-        return existing + candidates_with_clearance(self.scene, n, self._offer.over)
+        """Return existing projectors, and at least n of each model anywhere."""
+        existing = existing_devices(self.scene.requirements, self.templates)
+        every = n * len(self.templates)
+        return existing + candidates_with_clearance(self.scene, every, self._offer.over)
 
     def around(
         self,
@@ -107,6 +109,7 @@ class CandidateSet:
             max_count=required.max_projectors,
             n_existing=self.n_existing,
             regions=RegionFloors.of(self.scene, self.samples),
+            stock=DeviceStock.of(self.projectors, required.stock_of("projector")),
         )
 
     def extended(self, more: tuple[PlannedProjector, ...]) -> "CandidateSet":

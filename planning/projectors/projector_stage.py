@@ -72,7 +72,7 @@ class ProjectorStage(PlannedStage):
 
 def plan_projectors(
     scene: Scene,
-    template: PlannedProjector,
+    templates: tuple[PlannedProjector, ...],
     n_candidates: int,
     *,
     rounds: int = _ROUNDS,
@@ -88,7 +88,7 @@ def plan_projectors(
     Raises:
         NothingLitError: If no candidate lights any sample.
     """
-    source, plain = CandidateSource(scene, template), scene.without_floors
+    source, plain = CandidateSource(scene, templates), scene.without_floors
     samples = scene.target_samples(DRAWS.projectors)
     candidates = CandidateSet.over(plain, samples, source.lattice(n_candidates))
     if not candidates.lit.any():

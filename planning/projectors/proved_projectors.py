@@ -30,7 +30,7 @@ from .projector_stage import ProjectorStage
 def prove_fewest(
     scene: Scene,
     stage: ProjectorStage,
-    template: PlannedProjector,
+    templates: tuple[PlannedProjector, ...],
     effort: Effort,
 ) -> ProjectorStage:
     """Return the stage with the bound over all poses in its certificate.
@@ -38,9 +38,9 @@ def prove_fewest(
     Where the bound leaves room for fewer projectors, candidates are offered there, and
     the cover is solved again.
     """
-    source = CandidateSource(scene, template)
+    source = CandidateSource(scene, templates)
     while stage.certificate.needed.count > stage.certificate.given:
-        bound = _bound_of(scene, stage, template, effort)
+        bound = _bound_of(scene, stage, templates, effort)
         offered = source.towards(bound.directions)
         better = _with_more(stage, offered) if offered else stage
         if better is stage:
@@ -69,13 +69,16 @@ def _with_more(
 
 
 def _bound_of(
-    scene: Scene, stage: ProjectorStage, template: PlannedProjector, effort: Effort
+    scene: Scene,
+    stage: ProjectorStage,
+    templates: tuple[PlannedProjector, ...],
+    effort: Effort,
 ) -> ContinuousBound:
     # The first samples are a draw of their own; the others came where it overfitted.
     samples = stage.candidates.samples
     n = min(len(samples), effort.most_samples or len(samples))
     reached = stage.candidates.reached[:n]
-    free = reached & _lit_by_existing(scene, template, samples.take(np.arange(n)))
+    free = reached & _lit_by_existing(scene, templates, samples.take(np.arange(n)))
     question = BoundQuestion.about(
         stage.certificate,
         reached,
@@ -85,18 +88,18 @@ def _bound_of(
         RegionFloors.of(scene, samples.take(np.arange(n))),
     )
     wanted = samples.take(np.flatnonzero(reached & ~free))
-    return bound_projectors(scene, template, wanted, question, effort)
+    return bound_projectors(scene, templates, wanted, question, effort)
 
 
 def _lit_by_existing(
-    scene: Scene, template: PlannedProjector, samples: Target
+    scene: Scene, templates: tuple[PlannedProjector, ...], samples: Target
 ) -> NDArray[np.bool_]:
     """Return what existing projectors may light, whatever their ring axes, shape (n,).
 
     Their axes may yet be turned, so rings don't count: more that is free can only lower
     the bound.
     """
-    ringless = pattern_of(template).everywhere()
+    ringless = [pattern_of(template).everywhere() for template in templates]
     projectors = existing_devices(scene.requirements, ringless)
     if not projectors:
         return np.zeros(len(samples), dtype=bool)

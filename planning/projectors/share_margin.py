@@ -25,6 +25,7 @@ from planning.proofs.quotas import Quotas
 from planning.proofs.selection import cover_problem
 from planning.scene.placed_bodies import movable
 from planning.scene.scene import Scene
+from planning.scene.workspace.model_candidates import one_of_each
 from solvers import solve_max_coverage
 
 from .candidate_set import CandidateSource
@@ -105,7 +106,8 @@ def widest_between(
 ) -> tuple[PlannedProjector, ...]:
     """Return as many projectors at poses of larger margin, where there are any."""
     n_existing = len(projectors) - len(movable(projectors))
-    margin, source = margins(projectors), CandidateSource(scene, projectors[-1])
+    margin = margins(projectors)
+    source = CandidateSource(scene, one_of_each(reversed(projectors)))
     for scale in _SCALES:
         between = source.around(projectors, n_lattice, scale)
         if not between:

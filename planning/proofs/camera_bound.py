@@ -3,14 +3,16 @@
 The samples are those that the projectors light and some candidate measures, frozen as a
 set, and so is how many of them must be measured: the cover's own. Cells hold every
 position of the workspace, each with a superset of what a camera anywhere inside it
-measures with these projectors, however it is aimed and rolled (`measurable_cells`).
+measures with these projectors, however it is aimed and rolled (`measurable_cells`);
+of several models, what one of any model measures. How many there are of each is left
+out, which only takes away.
 Where the object overflows the image, cells are cut by aim as well (`aim_cells`).
 
 Shadows are counted only if the bound without them stays below the count: they cost
 most, and what is proved without them holds with them. So with cells by aim.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -42,7 +44,7 @@ PROVE = Effort(finest=8, aims=5, maps=7, budget=1e10, shadows=np.inf)
 
 def bound_cameras(
     scene: Scene,
-    device: PinholeModel,
+    devices: Sequence[PinholeModel],
     samples: LitSamples,
     question: BoundQuestion,
     effort: Effort,
@@ -54,7 +56,7 @@ def bound_cameras(
     if question.count <= 1:
         # What is required takes one, with shadows or without: no cell is looked at.
         effort = replace(effort, finest=0, aims=None, shadows=0.0)
-    trees = camera_trees(scene, device, samples, effort)
+    trees = camera_trees(scene, devices, samples, effort)
     tree, shadows = next(trees)
     best = question.searched(tree, effort.budget)
     # The next tree is asked for only where it is needed: shadows cost most.
@@ -69,15 +71,18 @@ def bound_cameras(
 
 
 def rough_bound(
-    scene: Scene, device: PinholeModel, samples: LitSamples, question: BoundQuestion
+    scene: Scene,
+    devices: Sequence[PinholeModel],
+    samples: LitSamples,
+    question: BoundQuestion,
 ) -> int:
     """Return what the roughest cells prove, which costs least."""
-    tree, _ = next(camera_trees(scene, device, samples, ROUGH))
+    tree, _ = next(camera_trees(scene, devices, samples, ROUGH))
     return int(question.searched(tree, ROUGH.budget).lower_bound)
 
 
 def camera_trees(
-    scene: Scene, device: PinholeModel, samples: LitSamples, effort: Effort
+    scene: Scene, devices: Sequence[PinholeModel], samples: LitSamples, effort: Effort
 ) -> Iterator[tuple[PositionTree | AimTree, bool]]:
     """Yield the trees to search, and whether shadows are counted in each.
 
@@ -85,15 +90,17 @@ def camera_trees(
     """
     space, drawn = scene.requirements.workspace, samples.target.samples
     limits = MeasurableCells(
-        samples, scene.requirements, device, check_cancelled=scene.check_cancelled
+        samples, scene.requirements, devices, check_cancelled=scene.check_cancelled
     )
+    ends = [device.range_m for device in devices]
+    reaches = min(low for low, _ in ends), max(high for _, high in ends)
 
     def positions(finest: int, maps: WidenedMaps | None) -> PositionTree:
         radius = space.camera_radius_m
         return PositionTree(
             space,
             radius,
-            device.range_m,
+            reaches,
             drawn.points,
             maps,
             finest=finest,
@@ -111,9 +118,10 @@ def camera_trees(
     yield positions(effort.finest + 1, maps), shadows
     reach = float(lengths(drawn.points - np.array(space.centre)).max())
     # Where a camera that looks at the centre misses no sample, aims forbid nothing.
-    if effort.aims is not None and not device.holds_ball(reach, near):
+    if effort.aims is not None and not any(d.holds_ball(reach, near) for d in devices):
         finer = positions(effort.finest + 1, maps)
-        yield AimTree(finer, image_cone(device).half_angle, finest=effort.aims), shadows
+        widest = max(image_cone(device).half_angle for device in devices)
+        yield AimTree(finer, widest, finest=effort.aims), shadows
 
 
 def _shadow_maps(scene: Scene, samples: Target, finest: int) -> WidenedMaps:

@@ -178,7 +178,7 @@ def _compatible(
         elif len(tried) >= demand.most:
             break
         covers = _harmless(among, standing, every, demand.spare)
-        completed = _completed(covers, standing, tried, demand, cover.seed)
+        completed = _completed(covers, standing, tried, demand, cover)
         if not waiting and completed == tried:
             break
         tried = completed
@@ -218,15 +218,17 @@ def _completed(
     standing: list[int],
     tried: list[int],
     demand: _Demand,
-    seed: int,
+    cover: CandidateCover,
 ) -> list[int]:
     """Return the candidates that stand, with others to cover what is required."""
-    problem = cover_problem(covers, demand.quotas)
+    problem = cover_problem(covers, demand.quotas, stock=cover.stock)
     problem = replace(problem, fixed=np.array(standing, np.int64))
     taken = np.array(standing, dtype=np.int64)
     least = min(max(len(standing), len(tried)), demand.most)
     for count in range(least, demand.most + 1):
-        taken = solve_max_coverage(problem, count, seed=seed, budget=_BUDGET).selected
+        taken = solve_max_coverage(
+            problem, count, seed=cover.seed, budget=_BUDGET
+        ).selected
         if demand.quotas.enough(np.any(covers[:, taken], axis=1)):
             break
     useful = np.asarray(covers.any(axis=0))

@@ -7,6 +7,7 @@ fewer projectors than were found can't be refuted, the cells that are left say w
 look.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -39,14 +40,15 @@ PROVE = Effort(finest=7, budget=6e10, shadows=np.inf, offers=150)
 
 def bound_projectors(
     scene: Scene,
-    template: PlannedProjector,
+    templates: Sequence[PlannedProjector],
     samples: Target,
     question: BoundQuestion,
     effort: Effort,
 ) -> ContinuousBound:
     """Bound the projectors over every pose of the workspace.
 
-    Field of view, beam and rings are left out: the bound holds for any of them.
+    Field of view, beam and rings are left out: the bound holds for any of them. Of
+    several models it is of the range that any has, and of any number of each.
 
     The samples are those that some candidate lights and no existing projector does.
     """
@@ -57,11 +59,13 @@ def bound_projectors(
     shadows = bool(len(samples) * len(scene.mesh.faces) <= effort.shadows)
     cube, required = CubeMap(1 << effort.finest), scene.requirements.projector
     limits = DirectionLimits(required.max_incidence, required.min_tangent_angle)
-    workspace, device = scene.requirements.workspace, template.device
+    workspace = scene.requirements.workspace
+    devices = [template.device for template in templates]
     near = workspace.projector_radius_m[0]
-    parallel = isinstance(device, ParallelModel)
+    parallel = isinstance(devices[0], ParallelModel)
     # How far off a device's own axis what it lights may be.
-    aside = reach + light_of(device).image_ring(0.0) if parallel else 0.0
+    widest = max(light_of(device).image_ring(0.0) for device in devices)
+    aside = reach + widest if parallel else 0.0
     depth = float(np.sqrt(max(0.0, near**2 - aside**2)))
     shadows = shadows and bool(depth >= reach)
     opened = open_samples(
@@ -75,7 +79,10 @@ def bound_projectors(
         tree = PositionTree(
             workspace,
             workspace.projector_radius_m,
-            device.range_m,
+            (
+                min(device.range_m[0] for device in devices),
+                max(device.range_m[1] for device in devices),
+            ),
             samples.samples.points,
             WidenedMaps(opened, cube),
             finest=effort.finest,

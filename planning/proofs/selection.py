@@ -4,9 +4,9 @@ Both stages pose the same program: samples are area-true, all of equal weight, s
 weights are counts and every comparison is exact.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from solvers.covers.cover import (
     solve_max_coverage,
 )
 
+from .device_stock import DeviceStock
 from .quotas import Quotas, RegionFloors
 
 # Counts beyond the one taken for which the best candidates are reported.
@@ -95,6 +96,7 @@ class CandidateCover:
         max_count: Candidates allowed; None for no limit.
         n_existing: First candidates that are taken whatever they cover.
         regions: Floors of regions; None: there are none.
+        stock: How many there are of each candidate's model; None: any number.
     """
 
     covers: NDArray[np.bool_]
@@ -103,6 +105,7 @@ class CandidateCover:
     max_count: int | None = None
     n_existing: int = 0
     regions: RegionFloors | None = None
+    stock: DeviceStock | None = None
 
     @cached_property
     def quotas(self) -> Quotas:
@@ -127,7 +130,7 @@ class CandidateCover:
     @cached_property
     def problem(self) -> CoverProblem:
         """The cover over the samples that some candidate covers."""
-        return cover_problem(self.covers, self.quotas, self.n_existing)
+        return self.asking(self.quotas)
 
     @cached_property
     def reduced(self) -> ReducedCover:
@@ -138,8 +141,23 @@ class CandidateCover:
     def _aimed(self) -> ReducedCover:
         if np.array_equal(self.aims.floors, self.quotas.floors):
             return self.reduced
-        aimed = cover_problem(self.covers, self.aims, self.n_existing)
-        return reduced_problem(aimed)
+        return reduced_problem(self.asking(self.aims))
+
+    def asking(self, required: Quotas) -> CoverProblem:
+        """Return the cover with other requirements."""
+        return cover_problem(self.covers, required, self.n_existing, self.stock)
+
+    @property
+    def most(self) -> int:
+        """Candidates that a selection may hold, whatever is required."""
+        n = self.covers.shape[1]
+        stock = n if self.stock is None else self.stock.total
+        return min(n if self.max_count is None else self.max_count, stock)
+
+    @property
+    def without_stock(self) -> "CandidateCover":
+        """The same cover with as many devices of each model as are wanted."""
+        return replace(self, stock=None)
 
     def _quotas(self, spare: float) -> Quotas:
         regions = self.regions or RegionFloors.none(len(self.covers))
@@ -199,6 +217,9 @@ def select_fewest(
     After the count is known, the selection that covers most at that count is taken.
 
     `known` candidates may cover as much with fewer than the search finds.
+
+    Where the stock doesn't suffice, those of it that cover most are taken; how many
+    would be needed is of any number of each model.
     """
     solution = solve_cover(
         cover.problem,
@@ -209,10 +230,13 @@ def select_fewest(
     )
     smallest, required = solution.selected, cover.required
     if known is not None and len(known) < len(smallest):
-        smallest = known if cover.enough(known) else smallest
+        there = cover.problem.in_stock(known)
+        smallest = known if there and cover.enough(known) else smallest
+    if cover.stock is not None and not cover.enough(smallest):
+        return _out_of_stock(cover, budget)
     needed = len(smallest)
     lower_bound = int(np.ceil(solution.lower_bound - 1e-9))
-    allowed = needed if cover.max_count is None else min(needed, cover.max_count)
+    allowed = min(needed, cover.most)
     chosen, bound = cover.most_covering(
         allowed, smallest if allowed == needed else None
     )
@@ -233,6 +257,19 @@ def select_fewest(
     )
 
 
+def _out_of_stock(cover: CandidateCover, budget: float) -> Selection:
+    """What covers most of a stock that isn't enough, and how many would be."""
+    wanted = select_fewest(replace(cover.without_stock, max_count=None), budget=budget)
+    chosen, bound = cover.most_covering(cover.most, None)
+    return replace(
+        wanted,
+        chosen=chosen,
+        status="infeasible",
+        n_covered=cover.n_covered(chosen),
+        n_covered_bound=bound,
+    )
+
+
 def fewest_count(cover: CandidateCover) -> int:
     """Return how many candidates `select_fewest` takes, and spend nothing on which."""
     return len(solve_cover(cover.problem, seed=cover.seed, heaviest=False).selected)
@@ -245,6 +282,7 @@ def marginals(cover: CandidateCover, selection: Selection) -> Marginals:
     n_covered: dict[int, tuple[int, int]] = {}
     best = np.empty(0, dtype=np.int64)
     most = min(taken + MORE, cover.covers.shape[1])
+    most = most if cover.stock is None else min(most, cover.stock.total)
     for count in range(max(1, cover.n_existing), most + 1):
         if count == taken:
             best = selection.chosen
@@ -264,7 +302,10 @@ def marginals(cover: CandidateCover, selection: Selection) -> Marginals:
 
 
 def cover_problem(
-    covers: NDArray[np.bool_], required: int | Quotas, n_existing: int = 0
+    covers: NDArray[np.bool_],
+    required: int | Quotas,
+    n_existing: int = 0,
+    stock: DeviceStock | None = None,
 ) -> CoverProblem:
     """State the cover over the samples that some candidate covers.
 
@@ -272,9 +313,13 @@ def cover_problem(
         covers: Whether a candidate (column) covers a sample (row), shape (n, m).
         required: Samples that must be covered, perhaps with floors of regions.
         n_existing: First candidates that are taken whatever they cover.
+        stock: How many there are of each candidate's model; None: any number.
     """
     reached = covers.any(axis=1)
-    rows, fixed = sparse_rows(covers[reached]), np.arange(n_existing)
+    rows = sparse_rows(covers[reached])
+    taken: dict[str, Any] = {"fixed": np.arange(n_existing)}
+    if stock is not None:
+        taken |= {"kinds": stock.kinds, "stock": stock.counts}
     if isinstance(required, Quotas) and required.floors.any():
         regions = required.regions.row[reached]
         return CoverProblem(
@@ -283,10 +328,10 @@ def cover_problem(
             required_weight=required.floors[: regions.max(initial=0) + 1].astype(float),
             required_total=required.total,
             row_sets=regions,
-            fixed=fixed,
+            **taken,
         )
     total = required.total if isinstance(required, Quotas) else required
-    return CoverProblem(rows, required_weight=np.array([total]), fixed=fixed)
+    return CoverProblem(rows, required_weight=np.array([total]), **taken)
 
 
 def _greedy_count(cover: CandidateCover) -> int:
@@ -296,9 +341,17 @@ def _greedy_count(cover: CandidateCover) -> int:
     """
     covers, count = cover.covers, cover.n_existing
     uncovered = ~np.any(covers[:, :count], axis=1)
+    left = None if cover.stock is None else cover.stock.left(np.arange(count))
     while not cover.quotas.enough(~uncovered):
         wanted = uncovered & cover.quotas.wanted(~uncovered)
-        best = int(np.argmax(covers[wanted].sum(axis=0)))
+        gains = covers[wanted].sum(axis=0)
+        if cover.stock is not None and left is not None:
+            gains[left[cover.stock.kinds] <= 0] = 0
+        best = int(np.argmax(gains))
+        if not gains[best] > 0:
+            break
+        if cover.stock is not None and left is not None:
+            left[cover.stock.kinds[best]] -= 1
         uncovered &= ~covers[:, best]
         count += 1
     return count

@@ -1,9 +1,11 @@
 """Turns a partial plan into a plan: poses rounded, every claim recomputed from them."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
+from numpy.typing import NDArray
 
 from planning.cameras.baselines.baseline_rows import baseline_rows
 from planning.cameras.baselines.seams import SampledSurface, overlap_components
@@ -36,13 +38,14 @@ from planning.report.entries.overlaps import overlap_records
 from planning.report.entries.range_entries import ranges_record, with_spread
 from planning.report.entries.violations import violations
 from planning.rings.ring_pitch import widest_gap
+from planning.scene.placed_bodies import Device
 from planning.scene.scene import Scene
 
 from .claims import Claims, make_claims
 from .entries import device_entries as entries
 from .judged import Devices
 from .marginal import marginal_records
-from .partial_plan import PartialPlan
+from .partial_plan import PartialPlan, Prepared
 
 
 def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
@@ -67,7 +70,7 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
             regions = with_small_floor(regions, partial.stage.candidates)
         certificates = with_fewer_needed(certificates, partial, clock)
     overlaps, schedule = overlap_records(among, devices.projectors)
-    surface = _surface(scene, devices)
+    surface = _surface(scene, devices, partial.ready)
     requirements = _final_requirements(among, claims, devices)
     projectors = entries.projector_records(among, devices, partial.rings, claims)
     cameras = entries.camera_records(among, devices.cameras, claims)
@@ -141,8 +144,8 @@ def _rounded_devices(partial: PartialPlan) -> Devices:
     )
 
 
-def _surface(scene: Scene, devices: Devices) -> Surface:
-    reference = devices.reference_projectors
+def _surface(scene: Scene, devices: Devices, ready: Prepared) -> Surface:
+    reference, views = devices.reference_projectors, devices.reference_cameras
     return Surface(
         scene.mesh,
         np.zeros(len(scene.mesh.faces), dtype=np.int64),
@@ -150,9 +153,21 @@ def _surface(scene: Scene, devices: Devices) -> Surface:
         scene.steep,
         np.stack([p.world_from_device for p in reference]),
         np.stack([p.world_from_ring for p in reference]),
-        np.stack([c.world_from_device for c in devices.reference_cameras]),
+        np.stack([c.world_from_device for c in views]),
         tuple(Obstacle(solid.name, solid.mesh) for solid in scene.obstructions),
+        _models_of(reference, ready.templates),
+        _models_of(views, ready.cameras),
     )
+
+
+def _models_of(
+    reference: Sequence[Device], templates: Sequence[Device]
+) -> NDArray[np.int64] | None:
+    """Model of each reference pose by its place; None where there is but one."""
+    if len(templates) == 1:
+        return None
+    place = {template.model: k for k, template in enumerate(templates)}
+    return np.array([place[device.model] for device in reference])
 
 
 def _surface_record(partial: PartialPlan, surface: Surface) -> SurfaceRecord:

@@ -68,16 +68,16 @@ class Prepared:
 
     Attributes:
         curvature_radius_m: Physical scale of the curvature.
-        template: A projector that stands nowhere: light, optics and rings.
-        camera: A camera that stands nowhere.
+        templates: A projector of each model that stands nowhere: light, optics, rings.
+        cameras: A camera of each model that stands nowhere.
     """
 
     request: PlanRequest
     scene: Scene
     regions: DominantRegions
     curvature_radius_m: float
-    template: PlannedProjector
-    camera: PlannedCamera
+    templates: tuple[PlannedProjector, ...]
+    cameras: tuple[PlannedCamera, ...]
 
 
 @dataclass(frozen=True, eq=False)

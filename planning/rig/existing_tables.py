@@ -1,6 +1,5 @@
-"""Existing devices, `[[existing]]`: as a rig file writes them, and in the world."""
+"""Existing devices as a rig file writes them, `[[existing]]`, with their poses."""
 
-from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -9,22 +8,20 @@ from pydantic import Field, model_validator
 
 from geometry.devices import DeviceModel
 from geometry.poses import turns_of
-from planning.model.bodies import Body, BodyTable, Existing
-from planning.model.device_poses import rounded_pose
-from planning.model.errors import InfeasibleLimitsError
-from planning.model.requirements import Requirements, Workspace
+from planning.model.bodies import BodyTable
+from planning.model.requirements import Workspace
 from planning.model.table_types import Axis, Name, Table, WrittenPose, read_pose
 from planning.scene.workspace.candidates import aimed_poses
 
 Tilt = Annotated[float, Field(ge=-90.0, le=90.0)]
 # Written where they aren't as for most.
-_OF_ITS_OWN = ("pan_deg", "tilt_deg", "origin", "body")
+_OF_ITS_OWN = ("pan_deg", "tilt_deg", "origin", "body", "model")
 
 
 class ExistingTable(Table):
-    """A projector or camera of the rig's own model, `[[existing]]`.
+    """A projector or camera of a model of the rig, `[[existing]]`.
 
-    Its pose comes in one of three ways; without a body of its own it has its kind's.
+    Its pose comes in one of three ways; without a body of its own it has its model's.
     """
 
     name: Name
@@ -37,6 +34,7 @@ class ExistingTable(Table):
     pose_mm: WrittenPose | None = None
     origin: Literal["mesh"] | None = None
     body: BodyTable | None = None
+    model: Name | None = None
 
     @model_validator(mode="after")
     def _check_pose(self) -> Self:
@@ -87,49 +85,3 @@ class ExistingTable(Table):
         degrees = self.pan_deg or 0.0, self.tilt_deg or 0.0, self.roll_deg
         pose[:3, :3], pose[:3, 3] = turns_of(np.radians(degrees), up), position
         return pose
-
-
-def build_existing(
-    tables: Sequence[ExistingTable],
-    workspace: Workspace,
-    devices: Mapping[str, tuple[DeviceModel, Body | None]],
-) -> tuple[Existing, ...]:
-    """Return the devices of `[[existing]]` in the world, as the plan will hold them.
-
-    `devices` are the rig's model of each kind, and its body.
-    """
-
-    def placed(table: ExistingTable) -> Existing:
-        device, body = devices[table.kind]
-        pose = rounded_pose(table.pose(workspace, device)).tolist()
-        rows = tuple(tuple(row) for row in pose)
-        return Existing(table.name, table.kind, rows, Body.of(table.body) or body)
-
-    return tuple(placed(table) for table in tables)
-
-
-def check_existing(required: Requirements) -> None:
-    """Refuse more existing devices than are allowed, and two where one can stand.
-
-    Raises:
-        InfeasibleLimitsError: It names the limit, both numbers and what to do.
-    """
-    for kind, most in (
-        ("projector", required.max_projectors),
-        ("camera", required.max_cameras),
-    ):
-        n = len(required.existing_of(kind))
-        if most is not None and n > most:
-            raise InfeasibleLimitsError(
-                f"max_{kind}s = {most} is less than the {n} {kind}s of [[existing]], "
-                f"or --fixed, which stay; raise --max-{kind}s or take one out"
-            )
-        places: dict[tuple[float, ...], str] = {}
-        for device in required.existing_of(kind):
-            place = tuple(row[3] for row in device.world_from_device[:3])
-            if place in places:
-                raise InfeasibleLimitsError(
-                    f"existing {kind}s {places[place]!r} and {device.name!r} stand at "
-                    f"the same place; take one out or correct it"
-                )
-            places[place] = device.name

@@ -25,6 +25,7 @@ from planning.scene.placed_bodies import Device, kind_of
 from planning.scene.ranges.csv_rows import CsvRow, read_csv
 
 from .existing_tables import ExistingTable
+from .models import Model
 from .rig import Rig
 from .rig_tables import check_names
 
@@ -35,7 +36,7 @@ _ANGLES = ("pan_deg", "tilt_deg")
 _QUATERNION = ("qw", "qx", "qy", "qz")
 _WAYS = {_AIM: ("roll_deg",), _ANGLES: ("roll_deg",), _QUATERNION: ()}
 REQUIRED = ("name", "kind", *_POSITION)
-OPTIONAL = (*_AIM, *_ANGLES, "roll_deg", *_QUATERNION)
+OPTIONAL = (*_AIM, *_ANGLES, "roll_deg", *_QUATERNION, "model")
 # How far a written quaternion may be from length 1.
 _UNIT = 1e-3
 
@@ -73,7 +74,9 @@ class Mounted:
         """
         known = {(table.kind, table.name): table for table in rig.table.existing}
         tables = [
-            table.model_copy(update={"body": old.body})
+            table.model_copy(
+                update={"body": old.body, "model": table.model or old.model}
+            )
             if (old := known.pop((table.kind, table.name), None))
             else table
             for table in self.tables
@@ -160,6 +163,8 @@ def _read_row(row: CsvRow) -> ExistingTable:
     if not row.has("name"):
         raise InputError(f"{row.where}: name is empty; every device has one")
     values: dict[str, Any] = {name: row.cells[name] for name in ("name", "kind")}
+    if row.has("model"):
+        values["model"] = row.cells["model"]
     position = [row.number(name) for name in _POSITION]
     begun = [way for way in _WAYS if any(row.has(name) for name in way)]
     if len(begun) != 1:
@@ -228,6 +233,7 @@ def _of_plan(path: Path, rig: Rig, only: Sequence[str] | None) -> Mounted:
                 kind="camera" if isinstance(device, PlannedCamera) else "projector",
                 pose_mm=_written(pose[:3, :3], 1e3 * pose[:3, 3]),
                 origin="mesh",
+                model=device.model or None,
             )
         )
         if isinstance(device, PlannedProjector) and name in spaced:
@@ -250,10 +256,9 @@ def _chosen(names: list[str], only: Sequence[str] | None, path: str) -> Sequence
 
 
 def _check_optics(device: Device, rig: Rig, path: str) -> None:
-    """Refuse a device that isn't of the rig's model."""
-    kind = kind_of(device)
-    model = rig.projector_device() if kind == "projector" else rig.camera_device()
-    theirs, ours = device.device.to_document(), model.to_document()
+    """Refuse a device that isn't of a model of the rig."""
+    kind, model = kind_of(device), _model_of(device, rig, path)
+    theirs, ours = device.device.to_document(), model.device.to_document()
     for key in ours:
         # A plan keeps no distortion of projectors.
         if (kind, key) == ("projector", "distortion"):
@@ -270,6 +275,18 @@ def _check_optics(device: Device, rig: Rig, path: str) -> None:
             )
 
 
+def _model_of(device: Device, rig: Rig, path: str) -> Model:
+    models = rig.models(kind_of(device))
+    for model in models:
+        if not device.model or device.model in (model.name, model.table.name):
+            return model
+    known = ", ".join(repr(model.table.name) for model in models)
+    raise InputError(
+        f"{path}: {device.id} is of the model {device.model!r}, rig {rig.name!r} has "
+        f"{known}; give --rig the file that the plan was made with"
+    )
+
+
 def _check_body(device: Device, rig: Rig, path: str) -> None:
     """Refuse a device whose housing would be lost; another one may be measured."""
     if device.body is None:
@@ -281,7 +298,7 @@ def _check_body(device: Device, rig: Rig, path: str) -> None:
         for table in rig.table.existing
     ):
         return
-    if (rig.projector_body() if kind == "projector" else rig.camera_body()) is None:
+    if _model_of(device, rig, path).body is None:
         raise InputError(
             f"{path}: {device.id} has a housing, a {kind} of rig {rig.name!r} none; "
             f"give --rig the file that the plan was made with"

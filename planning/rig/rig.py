@@ -16,24 +16,18 @@ from numpy.typing import NDArray
 
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.mesh.mesh import TriangleMesh
-from planning.model.bodies import Body, Mount
+from planning.model.bodies import Mount
 from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.model.obstacles import Obstacle
 from planning.model.requirements import Requirements, Workspace
 from planning.scene.lights import light_of
 
-from .existing_tables import build_existing, check_existing
+from .existing_devices import build_existing, check_existing
 from .lens_fit import LensFit, unsharp
+from .models import Model, models_of, most_of, stock_of
 from .object_size import ObjectSize
 from .obstacle_tables import obstacles_of
-from .rig_devices import (
-    device_document,
-    device_notes,
-    drawn_edges,
-    light_budget,
-    parallel_device,
-    pinhole_device,
-)
+from .rig_devices import device_document, device_notes, drawn_edges, light_budget
 from .rig_requirements import build_requirements, build_workspace, limit_notes
 from .rig_tables import MountingTable, ParallelTable, PinholeTable, RigTable, RingsTable
 from .toml.rig_files import changed, read_rig, rig_folder
@@ -106,7 +100,8 @@ class Rig:
     def ring_offset(self) -> float:
         """Tilt of the ring axis [rad]; in parallel light its shift on the panel [m]."""
         tilt = math.radians(self.table.rings.tilt_deg)
-        return light_of(self._projector).ring_offset(tilt, self.standoff_m)
+        light = light_of(self.projector_device())
+        return light.ring_offset(tilt, self.standoff_m)
 
     @property
     def rings(self) -> RingsTable:
@@ -131,52 +126,73 @@ class Rig:
         placement = self.table.placement
         return max(placement.n_candidate_cameras, placement.n_reference_cameras)
 
-    def projector_device(self) -> PinholeModel | ParallelModel:
-        """Return the optics of a projector.
+    @cached_property
+    def projector_models(self) -> tuple[Model, ...]:
+        """The models of projectors of this light, the first one first.
 
         Raises:
-            RigError: If the rig has no projector for this light.
+            RigError: If the rig has no projector for this light, or a list is none.
         """
-        return self._projector
+        key = self.projector_key
+        return models_of(self.table, key, self._projector_table)
+
+    @cached_property
+    def camera_models(self) -> tuple[Model, ...]:
+        """The models of cameras, the first one first.
+
+        Raises:
+            RigError: As of projectors.
+        """
+        return models_of(self.table, "camera", self.table.camera)
+
+    def models(self, kind: str) -> tuple[Model, ...]:
+        """Return the models of a `projector` or a `camera`."""
+        return self.projector_models if kind == "projector" else self.camera_models
+
+    def projector_device(self) -> PinholeModel | ParallelModel:
+        """Return the optics of the first model of projectors."""
+        return self.projector_models[0].device
 
     def camera_device(self) -> PinholeModel:
-        """Return the optics of a camera."""
-        return self._camera
+        """Return the optics of the first model of cameras."""
+        return _pinhole(self.camera_models[0])
 
-    def projector_body(self) -> Body | None:
-        """Return the body of a projector of this light, None where none is given."""
-        return Body.of(self._projector_table.body)
-
-    def camera_body(self) -> Body | None:
-        """Return the body of a camera, if it has one."""
-        return Body.of(self.table.camera.body)
+    @property
+    def optics(
+        self,
+    ) -> tuple[tuple[PinholeModel | ParallelModel, ...], tuple[PinholeModel, ...]]:
+        """Optics of all models of projectors, and of cameras."""
+        lit = tuple(model.device for model in self.projector_models)
+        return lit, tuple(_pinhole(model) for model in self.camera_models)
 
     def mounts(self) -> dict[str, Mount | None]:
         """Return `projector_mount` and `camera_mount` of `Workspace`."""
         tables = {"projector": self._projector_table, "camera": self.table.camera}
         return {f"{kind}_mount": Mount.of(each.mount) for kind, each in tables.items()}
 
-    def fit(self, role: str, size: ObjectSize) -> LensFit:
-        """Return how `camera` or `projector` suits an object, see `LensFit`."""
-        table, device = self.table.camera, self._camera
-        if role == "projector":
-            table, device = self._projector_table, self._projector
+    def fit(self, model: Model, size: ObjectSize) -> LensFit:
+        """Return how a model suits an object, see `LensFit`."""
+        role = model.role.replace(self.projector_key, "projector")
         stands = self.standoff_m, self.standoff_play_m
-        return LensFit(role, table, device, *stands, size)
+        return LensFit(role, model.table, model.device, *stands, size)
 
     def fits(self, mesh: TriangleMesh) -> tuple[LensFit, ...]:
-        """Return how camera and projector suit an object."""
-        return tuple(self.fit(r, ObjectSize.of(mesh)) for r in ("camera", "projector"))
+        """Return how cameras and projectors suit an object."""
+        size = ObjectSize.of(mesh)
+        return tuple(self.fit(model, size) for model in self._all_models)
 
     def outer_ring_radius(self) -> float:
         """Return the outermost ring, wherever the ring axis is turned or shifted to."""
-        return light_of(self._projector).image_ring(self.ring_offset)
+        return max(
+            light_of(model.device).image_ring(self.ring_offset)
+            for model in self.projector_models
+        )
 
     def notes(self) -> tuple[str, ...]:
         """Return what a user should know of limits and devices, a sentence each."""
-        lit = device_notes(self.projector_key, self._projector_table)
-        seen = device_notes("camera", self.table.camera)
-        return (*limit_notes(self.table.limits), *lit, *seen)
+        models = (*self.projector_models, *self.camera_models)
+        notes = [note for m in models for note in device_notes(m.role, m.table)]
+        return (*limit_notes(self.table.limits), *notes)
 
     def requirements(
         self,
@@ -196,31 +212,35 @@ class Rig:
             InfeasibleLimitsError: If no position in the workspace is admissible, or
                 more devices stand already than are allowed.
         """
-        projector, camera = self.projector_device(), self.camera_device()
         middle_m = self.standoff_m + object_radius_m
+
+        def overflow(kind: str) -> bool:
+            devices = [model.device for model in self.models(kind)]
+            return not all(d.holds_ball(object_radius_m, middle_m) for d in devices)
+
         workspace = build_workspace(
             self.table,
             self.outer_ring_radius(),
             mesh_centre,
             object_radius_m,
             wishes.up,
-            (
-                not projector.holds_ball(object_radius_m, middle_m),
-                not camera.holds_ball(object_radius_m, middle_m),
-            ),
+            (overflow("projector"), overflow("camera")),
         )
         workspace = replace(workspace, **self.mounts())
-        drawn = drawn_edges(self._projector_table, projector)
-        light = light_budget(self.table, self._projector_table, camera)
+        kinds = {kind: self.models(kind) for kind in ("projector", "camera")}
+        wishes = replace(
+            wishes,
+            max_projectors=most_of(kinds["projector"], wishes.max_projectors),
+            max_cameras=most_of(kinds["camera"], wishes.max_cameras),
+        )
+        drawn = drawn_edges(self._projector_table, self.projector_device())
+        light = light_budget(self.table, self._projector_table, self.camera_device())
         required = build_requirements(
             self.table, wishes, workspace, tau_m=tau_m, drawn_edges=drawn, light=light
         )
-        devices = {
-            "projector": (projector, self.projector_body()),
-            "camera": (camera, self.camera_body()),
-        }
-        existing = build_existing(self.table.existing, workspace, devices)
-        required = replace(required, existing=existing)
+        existing = build_existing(self.table.existing, workspace, kinds)
+        stock = tuple(s for kind, of in kinds.items() for s in stock_of(kind, of))
+        required = replace(required, existing=existing, stock=stock)
         check_existing(required)
         return required
 
@@ -255,15 +275,15 @@ class Rig:
             listed["photometry"] = table.photometry.model_dump(exclude_none=True)
         if table.placement.clearance_mm:
             listed["clearance_m"] = table.placement.clearance_mm * 1e-3
+        for kind in ("projector", "camera"):
+            if more := self.models(kind)[1:]:
+                listed[f"more_{kind}s"] = [self._document_of(model) for model in more]
         return {
             "name": self.name,
             "description": table.description,
             "light": self.light,
-            "projector": {
-                **device_document(self._projector_table, self._projector),
-                "light": self.light,
-            },
-            "camera": device_document(table.camera, self._camera),
+            "projector": self._document_of(self.projector_models[0]),
+            "camera": self._document_of(self.camera_models[0]),
             "standoff_m": self.standoff_m,
             "standoff_play_m": self.standoff_play_m,
             "n_candidate_projectors": table.placement.n_candidate_projectors,
@@ -271,7 +291,7 @@ class Rig:
             "rings": {
                 "tilt": None,
                 "shift_m": None,
-                light_of(self._projector).offset_key: self.ring_offset,
+                light_of(self.projector_device()).offset_key: self.ring_offset,
                 "gap_m": self.ring_gap_m,
                 "spacing": self.rings.spacing,
                 "axis": self.rings.axis,
@@ -287,16 +307,13 @@ class Rig:
             **listed,
         }
 
-    @cached_property
-    def _camera(self) -> PinholeModel:
-        return pinhole_device(self.table.camera, "camera")
+    @property
+    def _all_models(self) -> tuple[Model, ...]:
+        return (*self.camera_models, *self.projector_models)
 
-    @cached_property
-    def _projector(self) -> PinholeModel | ParallelModel:
-        table = self._projector_table
-        if isinstance(table, ParallelTable):
-            return parallel_device(table)
-        return pinhole_device(table, "projector")
+    def _document_of(self, model: Model) -> dict[str, Any]:
+        lit = {"light": self.light} if model in self.projector_models else {}
+        return {**device_document(model.table, model.device), **lit}
 
     @property
     def projector_key(self) -> str:
@@ -316,13 +333,18 @@ class Rig:
         return table
 
 
+def _pinhole(model: Model) -> PinholeModel:
+    assert isinstance(model.device, PinholeModel)
+    return model.device
+
+
 def _check_devices(rig: Rig) -> None:
     """Refuse a rig whose devices can't be sharp at the standoff."""
-    devices = {"projector": rig.projector_device(), "camera": rig.camera_device()}
+    models = (*rig.projector_models, *rig.camera_models)
     blurred = [
-        f"rig {rig.name}: {unsharp(rig.fit(role, ObjectSize.ball(0.0)))}"
-        for role, device in devices.items()
-        if not device.range_m[0] <= rig.standoff_m <= device.range_m[1]
+        f"rig {rig.name}: {unsharp(rig.fit(model, ObjectSize.ball(0.0)))}"
+        for model in models
+        if not model.device.range_m[0] <= rig.standoff_m <= model.device.range_m[1]
     ]
     if blurred:
         raise InfeasibleLimitsError("\n".join(blurred))

@@ -72,6 +72,17 @@ def parallel_device(table: ParallelTable) -> ParallelModel:
     )
 
 
+def device_of(table: PinholeTable | ParallelTable, role: str) -> DeviceModel:
+    """Return the model of a device of either kind and light, `role` in messages.
+
+    Raises:
+        RigError: As of `pinhole_device`.
+    """
+    if isinstance(table, ParallelTable):
+        return parallel_device(table)
+    return pinhole_device(table, role)
+
+
 def drawn_edges(table: PinholeTable | ParallelTable, device: DeviceModel) -> DrawnEdges:
     """Return what blurs the edges that a projector draws; unsaid: its focus doesn't."""
     if isinstance(table, ParallelTable) or table.focus is None:
@@ -182,12 +193,13 @@ def device_document(
         **device.to_document(),
         "figures": table.model_dump(
             mode="json",
-            exclude={"name", "device", "sources"},
+            exclude={"name", "device", "sources", "count"},
             exclude_none=True,
             exclude_unset=True,
         ),
         "sources": {key: table.sources.get(key, _UNSAID) for key in table.figures()},
         **({} if body is None else {"body": asdict(body)}),
+        **({} if table.count is None else {"count": table.count}),
     }
 
 

@@ -37,6 +37,7 @@ from .workspace_tables import WorkspaceTable, check_names
 
 # Far beyond any device, and any table of poses and samples that memory holds.
 MOST_PIXELS, MOST_POSES = 100_000, 100_000
+MOST_DEVICES, MOST_MODELS = 1_000, 20
 Resolution = Annotated[
     list[Annotated[int, Field(ge=2, le=MOST_PIXELS)]],
     Field(min_length=2, max_length=2),
@@ -58,6 +59,7 @@ class DeviceTable(SourcedTable):
 
     name: Name
     device: Name | None = None
+    count: Annotated[int, Field(ge=1, le=MOST_DEVICES)] | None = None
     body: BodyTable | None = None
     mount: MountTable | None = None
 
@@ -261,7 +263,7 @@ class CheckTable(Table):
 
 
 class RigTable(Table):
-    """A whole rig file."""
+    """A whole rig file; a list of devices has been parted into the first and more."""
 
     name: Name
     description: str = ""
@@ -280,10 +282,17 @@ class RigTable(Table):
     check: CheckTable = CheckTable()
     existing: list[ExistingTable] = Field(default=[])
     obstacle: list[ObstacleTable] = Field(default=[])
+    more_cameras: list[CameraTable] = Field(default=[], max_length=MOST_MODELS)
+    more_projectors: list[ProjectorTable] = Field(default=[], max_length=MOST_MODELS)
+    more_parallel_projectors: list[ParallelTable] = Field(
+        default=[], max_length=MOST_MODELS
+    )
 
     @model_validator(mode="after")
     def _check_clearance(self) -> Self:
-        devices = (self.camera, self.projector, self.parallel_projector, *self.existing)
+        devices = (self.camera, self.projector, self.parallel_projector)
+        devices += (*self.more_cameras, *self.more_projectors, *self.existing)
+        devices += tuple(self.more_parallel_projectors)
         clearance = self.placement.clearance_mm
         if clearance and not any(device and device.body for device in devices):
             raise ValueError(

@@ -1,5 +1,7 @@
 """The rings of a projector: their radii, and the gap between them."""
 
+from collections.abc import Iterable, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -33,6 +35,20 @@ def ring_gap(
     """
     for_camera = least_pitch_px(limits) * distance / (camera.focal_px * _GAP_FACING)
     return max(for_camera, MIN_PROJECTOR_PX * projector.pixel_m(distance))
+
+
+def widest_ring_gap(
+    projectors: Iterable[DeviceModel],
+    cameras: Sequence[PinholeModel],
+    limits: TriangulationLimits,
+    distance: float,
+) -> float:
+    """Return the spacing that every camera separates and every projector draws [m]."""
+    return max(
+        ring_gap(projector, camera, limits, distance)
+        for projector in projectors
+        for camera in cameras
+    )
 
 
 def least_pitch_px(limits: TriangulationLimits) -> float:

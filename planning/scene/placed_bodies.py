@@ -8,7 +8,7 @@ sample.
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Requirements
 
 Device = PlannedProjector | PlannedCamera
+Kind = Literal["projector", "camera"]
 _D = TypeVar("_D", PlannedProjector, PlannedCamera)
 
 # What is planned stays this far apart: positions are rounded to 0.01 mm afterwards.
@@ -131,7 +132,7 @@ class PlacedBody:
 Blocker = PlacedBody | Obstruction
 
 
-def kind_of(device: Device) -> str:
+def kind_of(device: Device) -> Kind:
     """Return `projector` or `camera`."""
     return "projector" if isinstance(device, PlannedProjector) else "camera"
 
@@ -163,11 +164,12 @@ def moves_bodies(devices: Iterable[Device]) -> bool:
     return any(d.body is not None and not d.existing for d in devices)
 
 
-def existing_devices(required: Requirements, template: _D) -> tuple[_D, ...]:
-    """Return the devices of a template's kind, with its optics, that stand already."""
+def existing_devices(required: Requirements, templates: Sequence[_D]) -> tuple[_D, ...]:
+    """Return the devices of a kind that stand already, like their models'."""
 
     def placed(device: Existing) -> _D:
         pose = np.array(device.world_from_device)
+        (template,) = (t for t in templates if t.model == device.model)
         stands = replace(
             moved_to(template, pose), existing=device.name, body=device.body
         )
@@ -180,7 +182,8 @@ def existing_devices(required: Requirements, template: _D) -> tuple[_D, ...]:
             keeps_rings=True,
         )
 
-    return tuple(placed(device) for device in required.existing_of(kind_of(template)))
+    kind = kind_of(templates[0])
+    return tuple(placed(device) for device in required.existing_of(kind))
 
 
 def movable(devices: Sequence[_D]) -> list[_D]:

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,14 +19,13 @@ from .draws import DRAWS, Draw
 from .placed_bodies import (
     Blocker,
     Device,
+    Kind,
     Obstruction,
     PlacedBody,
     bodies_of,
     existing_bodies,
 )
 from .samples import Target, merged
-
-Kind = Literal["projector", "camera"]
 
 # Positions are written to 0.01 mm; twice the half diagonal of that cube.
 _ROUNDING_M = 2e-5

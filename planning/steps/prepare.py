@@ -24,7 +24,7 @@ from planning.report.partial_plan import PlanRequest, Prepared
 from planning.rig.range_guard import Guard, guarded
 from planning.rig.rig import Rig
 from planning.rig.wishes import TargetName, Wishes
-from planning.rings.ring_radii import ring_gap, uniform_radii
+from planning.rings.ring_radii import uniform_radii, widest_ring_gap
 from planning.scene.bodies.clearance import check_existing_clearance
 from planning.scene.camera_views import CandidateViews
 from planning.scene.interest import Select, Weight, interest_of
@@ -54,6 +54,7 @@ def request_of(
     selected = select is not None or weight is not None
     ranges: tuple[RangedBody, Guard] | None = None
     if isinstance(mesh, RangedBody):
+        _check_single(rig)
         wishes = replace(wishes, target=_whole(wishes.target, selected))
         rig, guard = guarded(rig, mesh)
         mesh, ranges = mesh.mesh, (mesh, guard)
@@ -71,6 +72,16 @@ def request_of(
     if interest is not None:
         interest = interest.on_parts(parent)
     return PlanRequest(cut, rig, wishes, interest=interest, ranges=ranges)
+
+
+def _check_single(rig: Rig) -> None:
+    """Refuse several models for a body of which only ranges are known."""
+    for kind in ("projector", "camera"):
+        if (n := len(rig.models(kind))) > 1:
+            raise InputError(
+                f"rig {rig.name!r} has {n} models of {kind}s; for a body that is known "
+                f"by its ranges alone what is kept free is of one: take one"
+            )
 
 
 def _whole(target: str | None, selected: bool) -> TargetName:
@@ -101,6 +112,11 @@ def prepared(request: PlanRequest, clock: Stopwatch) -> Prepared:
         InfeasibleLimitsError: If limits exclude each other.
     """
     mesh, rig = request.mesh, request.rig
+    if request.cameras_by == "paper" and len(rig.camera_models) > 1:
+        raise InputError(
+            f"cameras_by = 'paper': the paper's route is of cameras of one model, rig "
+            f"{rig.name!r} has {len(rig.camera_models)}; take 'cover' or 'both'"
+        )
     # What the rig asks for in vain is told before the work.
     requirements, radii = _resolve(request)
     obstacles = rig.obstacles(requirements.workspace, mesh)
@@ -118,21 +134,28 @@ def prepared(request: PlanRequest, clock: Stopwatch) -> Prepared:
         clock.check,
         obstructions=Obstruction.about(mesh, obstacles, request.threads),
     )
-    template = PlannedProjector(
-        "",
-        rig.light,
-        np.eye(4),
-        # Upwards in the image until cameras are known.
-        ring_frame(np.eye(4), rig.projector_device(), rig.ring_offset, -0.5 * np.pi),
-        rig.projector_device(),
-        radii,
-        body=rig.projector_body(),
-        pattern=requirements.pattern,
+    templates = tuple(
+        PlannedProjector(
+            "",
+            rig.light,
+            np.eye(4),
+            # Upwards in the image until cameras are known.
+            ring_frame(np.eye(4), model.device, rig.ring_offset, -0.5 * np.pi),
+            model.device,
+            radii,
+            body=model.body,
+            pattern=requirements.pattern,
+            model=model.name,
+        )
+        for model in rig.projector_models
     )
-    camera = PlannedCamera("", np.eye(4), rig.camera_device(), body=rig.camera_body())
+    cameras = tuple(
+        PlannedCamera("", np.eye(4), device, body=model.body, model=model.name)
+        for model, device in zip(rig.camera_models, rig.optics[1], strict=True)
+    )
     if not request.evaluates:
-        check_existing_clearance(scene, template, camera)
-    return Prepared(request, scene, regions, field.radius, template, camera)
+        check_existing_clearance(scene, templates, cameras)
+    return Prepared(request, scene, regions, field.radius, templates, cameras)
 
 
 def _regions(request: PlanRequest, field: CurvatureField) -> DominantRegions:
@@ -154,11 +177,10 @@ def _resolve(request: PlanRequest) -> tuple[Requirements, NDArray[np.float64]]:
     requirements = rig.requirements(
         mesh.centre, mesh.radius, request.wishes, tau_m=rig.standoff_m
     )
-    projector, camera = rig.projector_device(), rig.camera_device()
-    light, offset = light_of(projector), rig.ring_offset
+    light, offset = light_of(rig.projector_device()), rig.ring_offset
     workspace = requirements.workspace
-    gap = rig.ring_gap_m or ring_gap(
-        projector, camera, requirements.triangulation, rig.standoff_m
+    gap = rig.ring_gap_m or widest_ring_gap(
+        *rig.optics, requirements.triangulation, rig.standoff_m
     )
     corner = rig.outer_ring_radius()
     nearest = workspace.projector_radius_m[0]
@@ -195,18 +217,24 @@ def offered(ready: Prepared) -> tuple[tuple[PlannedProjector, ...], CandidateVie
     required = scene.requirements
     known = None if mounted is None else mounted.reference(required.workspace)
     if known is None:
-        source = CandidateSource(scene, ready.template)
-        views = camera_candidate_views(scene, ready.camera, rig.n_camera_poses)
+        source = CandidateSource(scene, ready.templates)
+        views = camera_candidate_views(scene, ready.cameras, rig.n_camera_poses)
         return source.lattice(rig.n_projector_poses), views
-    frames = zip(known.reference_projectors, known.reference_rings, strict=True)
-    projectors = (
-        replace(ready.template, world_from_device=pose, world_from_ring=ring)
-        for pose, ring in frames
+    poses = zip(
+        known.reference_projectors,
+        known.reference_rings,
+        known.models_of("projector"),
+        strict=True,
     )
-    cameras = (moved_to(ready.camera, pose) for pose in known.reference_cameras)
+    projectors = (
+        replace(ready.templates[model], world_from_device=pose, world_from_ring=ring)
+        for pose, ring, model in poses
+    )
+    views = zip(known.reference_cameras, known.models_of("camera"), strict=True)
+    cameras = (moved_to(ready.cameras[model], pose) for pose, model in views)
     return (
-        (*existing_devices(required, ready.template), *projectors),
-        CandidateViews(scene, (*existing_devices(required, ready.camera), *cameras)),
+        (*existing_devices(required, ready.templates), *projectors),
+        CandidateViews(scene, (*existing_devices(required, ready.cameras), *cameras)),
     )
 
 

@@ -49,7 +49,7 @@ def first_projectors(ready: Prepared, clock: Stopwatch) -> ProjectorStage:
     n_poses = ready.request.rig.n_projector_poses
     with clock.stage("projectors", "projectors: candidates and cover"):
         try:
-            stage = plan_projectors(ready.scene, ready.template, n_poses)
+            stage = plan_projectors(ready.scene, ready.templates, n_poses)
         except NothingLitError as error:
             helps = nothing_lit(ready.scene, error)
             helps += standing_inside(ready.scene, error.candidates.projectors)
@@ -65,7 +65,7 @@ def bounded_projectors(
     prove = ready.request.prove
     with clock.stage("bounds", "bounds over all poses of the workspace"):
         effort = projector_bound.PROVE if prove else projector_bound.DEFAULT
-        stage = prove_fewest(ready.scene, stage, ready.template, effort)
+        stage = prove_fewest(ready.scene, stage, ready.templates, effort)
         clock.say(f"  projectors: {_bound_words(stage.certificate)}")
     more, allowed = stage, ready.scene.requirements.max_projectors
     while more and len(more.projectors) < ready.request.least_projectors:
@@ -101,7 +101,7 @@ def placed(
         projectors = with_exposures(ready.scene, projectors)
     with clock.stage("cameras", "cameras: candidates, measurability and cover"):
         scene = ready.scene.among(projectors)
-        views = camera_candidate_views(scene, ready.camera, request.rig.n_camera_poses)
+        views = camera_candidate_views(scene, ready.cameras, request.rig.n_camera_poses)
         try:
             solution = place_for_axes(
                 scene,
@@ -163,7 +163,7 @@ def polished(partial: PartialPlan, clock: Stopwatch) -> PartialPlan:
             partial.scene,
             CameraSolution(partial.projectors, stage, partial.axes),
             moved.cameras,
-            partial.ready.template,
+            partial.ready.templates,
             partial.request.ring_margin,
         )
         return replace(partial, other_axes=others)
@@ -207,7 +207,7 @@ def bounded_cameras(partial: PartialPlan, clock: Stopwatch) -> PartialPlan:
         return partial
     with clock.stage("camera_bounds", "bounds over all poses of the cameras"):
         effort = camera_bound.PROVE if request.prove else camera_bound.DEFAULT
-        stage = bound_stage(partial.scene, stage, request.rig.camera_device(), effort)
+        stage = bound_stage(partial.scene, stage, request.rig.optics[1], effort)
         clock.say(f"  cameras: {_bound_words(stage.certificate)}")
     return replace(partial, camera_stage=stage)
 
@@ -296,7 +296,7 @@ def as_they_stand(ready: Prepared, clock: Stopwatch) -> PartialPlan:
             scene, projectors, views, target, axis=asked, margin=margin
         )
         samples, measured = measured_of(scene, projectors, views, target)
-        cover = candidate_cover(scene, measured, samples)
+        cover = candidate_cover(scene, measured, samples, views.cameras)
         proof = unproved(cover, target.samples.weight)
         camera_stage = CameraStage(
             {len(cameras): cameras},

@@ -230,9 +230,7 @@ def _labels(name: str, numbers: ArrayLike | None, n: int) -> NDArray[np.int64]:
     return labels
 
 
-def _stock(
-    numbers: ArrayLike | None, kinds: NDArray[np.int64]
-) -> NDArray[np.int64]:
+def _stock(numbers: ArrayLike | None, kinds: NDArray[np.int64]) -> NDArray[np.int64]:
     n_kinds = int(kinds.max(initial=0)) + 1
     if numbers is None:
         return np.full(n_kinds, kinds.size)

@@ -1,7 +1,7 @@
 """Fewest sets of a cover whose kinds have a stock.
 
-The stock is left out first: those searches are fast and exact, and their bound holds for
-any stock. Where what they choose isn't in stock, as many sets that are in stock are
+The stock is left out first: those searches are fast and exact, and their bound holds
+for any stock. Where what they choose isn't in stock, as many sets that are in stock are
 looked for, then one more, and so on; from below, counts are refuted by multipliers that
 count the stock, at last by HiGHS' branch and bound.
 """
@@ -11,7 +11,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from solvers.covers.bounds.lagrangian import tighten
 from solvers.covers.bounds.mixed_integer import branch_and_bound, fits

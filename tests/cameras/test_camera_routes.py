@@ -71,7 +71,7 @@ def ball():
     lens, radii = rig.projector_device(), uniform_radii(0.3, 0.0035)
     ring = ring_frame(eye, lens, rig.ring_offset, -np.pi / 2)
     template = PlannedProjector("", rig.light, eye, ring, lens, radii)
-    stage = plan_projectors(scene, template, 120, rounds=1)
+    stage = plan_projectors(scene, (template,), 120, rounds=1)
     camera = make_camera(rig)
     return scene, stage.projectors, camera
 
@@ -80,7 +80,7 @@ def ball():
 def coarse(ball):
     """A cover of forty candidates, and what the default makes of it."""
     scene, projectors, camera = ball
-    offered = camera_candidate_views(scene, camera, 40)
+    offered = camera_candidate_views(scene, (camera,), 40)
     cover = cover_by_cover(scene, projectors, offered)
     return cover, *better_route(scene, projectors, cover, "both")
 
@@ -90,7 +90,7 @@ def fine(ball):
     """The same of 160 candidates, which hold as small a cover."""
     scene, projectors, camera = ball
     cover = cover_by_cover(
-        scene, projectors, camera_candidate_views(scene, camera, 160)
+        scene, projectors, camera_candidate_views(scene, (camera,), 160)
     )
     return cover, *better_route(scene, projectors, cover, "both")
 
@@ -139,7 +139,7 @@ def test_the_route_is_the_same_on_every_run_and_with_two_threads(ball, coarse):
 
 def test_the_route_alone_is_bounded_over_candidates_and_itself(ball):
     scene, projectors, camera = ball
-    offered = camera_candidate_views(scene, camera, 40)
+    offered = camera_candidate_views(scene, (camera,), 40)
     cover = cover_by_paper(scene, projectors, offered)
     found = cover.selection
     assert found.needed == 3
@@ -159,7 +159,7 @@ def test_the_route_alone_is_bounded_over_candidates_and_itself(ball):
 def test_too_few_allowed_are_the_best_of_the_route_and_say_what_is_needed(ball):
     scene, projectors, camera = ball
     few = replace(scene, requirements=replace(scene.requirements, max_cameras=2))
-    cover = cover_by_paper(few, projectors, camera_candidate_views(few, camera, 40))
+    cover = cover_by_paper(few, projectors, camera_candidate_views(few, (camera,), 40))
     assert cover.selection.status == "infeasible"
     assert (len(cover.cameras), cover.selection.needed) == (2, 3)
     _, routes, _ = better_route(few, projectors, cover, "paper")
@@ -184,7 +184,9 @@ def test_as_many_as_are_said_to_suffice_do_where_the_route_ended_short(ball, fin
     route = RouteCameras(cover.candidates, cover.measured, passed, None, 0.9)
     short = cover_of(few, projectors, cover.samples, route)
     assert len(short.cameras) == 1
-    required = candidate_cover(few, cover.measured, cover.samples)
+    required = candidate_cover(
+        few, cover.measured, cover.samples, cover.candidates.cameras
+    )
     assert required.enough(short.selection.smallest)
     proof = camera_stage(few, short).certificate
     assert proof.needed.count == len(short.selection.smallest) == 3
@@ -202,7 +204,9 @@ def test_bodies_of_the_routes_cameras_keep_off_each_other(ball):
     """Bodies so deep that cameras less than 1 m apart collide before the ball."""
     scene, projectors, camera = ball
     bulky = replace(camera, body=Body((0.0, 0.0, -0.2), (0.2, 0.2, 0.2)))
-    cover = cover_by_paper(scene, projectors, camera_candidate_views(scene, bulky, 40))
+    cover = cover_by_paper(
+        scene, projectors, camera_candidate_views(scene, (bulky,), 40)
+    )
     assert cover.interference is not None
     chosen = cover.selection.chosen.tolist()
     assert cover.interference.stand_together(chosen)
@@ -216,7 +220,7 @@ def test_what_no_camera_sees_is_refused(ball):
     blind = replace(camera.device, range_m=(5.0, 6.0))
     far = replace(camera, device=blind)
     with pytest.raises(InfeasibleLimitsError, match="no camera of 40 poses"):
-        cover_by_paper(scene, projectors, camera_candidate_views(scene, far, 40))
+        cover_by_paper(scene, projectors, camera_candidate_views(scene, (far,), 40))
 
 
 def test_the_papers_cameras_are_taken_where_they_stand_clearly_farther_apart(
@@ -257,7 +261,9 @@ def test_cameras_slide_no_farther_than_candidates_reach(ball, monkeypatch):
     draw_fewer(monkeypatch, baselines=1500)
     scene, projectors, camera = ball
     short = replace(camera, device=replace(camera.device, range_m=(1.0, 1.03)))
-    cover = cover_by_cover(scene, projectors, camera_candidate_views(scene, short, 12))
+    cover = cover_by_cover(
+        scene, projectors, camera_candidate_views(scene, (short,), 12)
+    )
     stage = camera_stage(scene, cover)
     samples = baseline_samples(scene.among(projectors), projectors)
     held = held_to_candidates(samples, stage.reference, cover.samples, cover.measured)

@@ -73,8 +73,8 @@ def planned(
         requirements=replace(required, projector=limits),
         steep=np.zeros((len(mesh.faces), 3)) if steep is None else steep,
     )
-    stage = plan_projectors(scene, ready.template, 300, rounds=1)
-    stage = prove_fewest(scene, stage, ready.template, effort)
+    stage = plan_projectors(scene, ready.templates, 300, rounds=1)
+    stage = prove_fewest(scene, stage, ready.templates, effort)
     proof = stage.certificate
     return Planned(scene, stage, proof.needed.count, proof.continuous.lower_bound)
 

@@ -42,7 +42,7 @@ def lattice(ball):
     scene, template = ball
     poses = Candidates(template, scene.requirements.workspace).over(40)
     samples = scene.target_samples(Draw(2000, 100))
-    return CandidateSource(scene, template), CandidateSet.over(scene, samples, poses)
+    return CandidateSource(scene, (template,)), CandidateSet.over(scene, samples, poses)
 
 
 def moved(lattice, n_projectors, n_existing=0):

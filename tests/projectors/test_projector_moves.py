@@ -110,7 +110,7 @@ def test_moves_reach_no_more_than_what_was_proved_is_a_share_of():
     whole = np.zeros(len(mesh.faces), dtype=int)
     scene = make_scene(mesh, required, region=whole)
     template = make_projector(rig, uniform_radii(0.2, 0.0035), (0.14, -1.57))
-    stage = plan_projectors(scene, template, 400, rounds=1)
+    stage = plan_projectors(scene, (template,), 400, rounds=1)
     moved = widen_margins(scene, stage)
     before = margins(scene, stage, stage.projectors)
     after = margins(scene, stage, moved)

@@ -52,8 +52,8 @@ def planned(sides, floor, **wishes):
     )
     scene = make_scene(mesh, replace(required, projector=limits), region=region)
     template = make_projector(rig, uniform_radii(0.2, 0.0035), (0.14, -1.57))
-    stage = plan_projectors(scene, template, 120)
-    stage = prove_fewest(scene, stage, template, EFFORT)
+    stage = plan_projectors(scene, (template,), 120)
+    stage = prove_fewest(scene, stage, (template,), EFFORT)
     return scene, stage, widen_margins(scene, stage)
 
 

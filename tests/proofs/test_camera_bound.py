@@ -107,7 +107,7 @@ def bounded(scene, share, count, *, n=300, effort=EFFORT, device=None):
     rows = everything_lit(scene, n)
     required = int(np.ceil(share * n - 1e-9))
     question = all_poses.BoundQuestion(required, count, n, rows.target.samples.weight)
-    return bound_cameras(scene, device or lens(), rows, question, effort)
+    return bound_cameras(scene, (device or lens(),), rows, question, effort)
 
 
 def test_shadows_are_drawn_only_where_the_first_search_leaves_a_doubt(monkeypatch):
@@ -486,7 +486,7 @@ def test_cameras_inside_the_object_cast_no_shadows_that_are_relied_on():
     """Where the shell cuts the object, something may stand behind the camera."""
     for radius, counted in ((0.05, False), (0.9, True)):
         scene = scene_of(PLATES, limits=FREE, camera_radius_m=(radius, 1.2))
-        trees = camera_trees(scene, lens(), everything_lit(scene, 50), EFFORT)
+        trees = camera_trees(scene, (lens(),), everything_lit(scene, 50), EFFORT)
         assert any(shadows for _, shadows in trees) == counted
         found = bounded(scene, 0.45, 3, n=50, effort=replace(EFFORT, finest=2))
         assert found.shadows == (counted or found.found.status is CellStatus.PROVED)
@@ -506,7 +506,9 @@ def staged(existing=()):
     scene = scene_of(ball, existing=existing, coverage=0.97, limits=limits)
     projectors = projectors_at((0.3, -1.0, 0.4), (-0.6, 0.2, 0.9))
     camera = PlannedCamera("", np.eye(4), load_rig("default").camera_device())
-    cover = plan_cameras(scene, projectors, camera_candidate_views(scene, camera, 200))
+    cover = plan_cameras(
+        scene, projectors, camera_candidate_views(scene, (camera,), 200)
+    )
     return scene, camera_stage(scene, cover)
 
 
@@ -517,7 +519,7 @@ def test_a_certificate_says_what_holds_over_all_poses(given):
     scene, stage = staged(existing)
     assert stage.certificate.continuous is None
     device = load_rig("default").camera_device()
-    found = bound_stage(scene, stage, device, replace(EFFORT, finest=6))
+    found = bound_stage(scene, stage, (device,), replace(EFFORT, finest=6))
     proof = found.certificate.to_document()
     entry, needed = proof["continuous"], proof["needed"]
     assert given < entry["lower_bound"] <= needed["count"]
@@ -546,7 +548,7 @@ def test_cameras_that_stand_already_and_are_enough_need_no_cells():
     ]
     scene, stage = staged(existing)
     device = load_rig("default").camera_device()
-    proof = bound_stage(scene, stage, device, EFFORT).certificate.continuous
+    proof = bound_stage(scene, stage, (device,), EFFORT).certificate.continuous
     assert (proof.lower_bound, proof.n_cells) == (len(existing), 0)
 
 

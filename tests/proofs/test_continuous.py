@@ -58,7 +58,7 @@ def bounded(mesh, light, share, count, effort=QUICK, n=400, **options):
     rows = scene.target_samples(Draw(n, 3))
     required = int(np.ceil(share * n - 1e-9))
     asked = question(required, count, n, rows.samples.weight)
-    return bound_projectors(scene, template, rows, asked, effort)
+    return bound_projectors(scene, (template,), rows, asked, effort)
 
 
 SHAPES = {
@@ -145,7 +145,7 @@ def test_no_pose_lights_what_its_cells_lack(name, light, tangent_deg):
         SHAPES[name], light, tangent_deg=tangent_deg, steep=(0.3, 0.2, 1.0)
     )
     rows = scene.target_samples(Draw(300, 5))
-    found = bound_projectors(scene, template, rows, question(250, 9), QUICK)
+    found = bound_projectors(scene, (template,), rows, question(250, 9), QUICK)
     assert found.shadows
     tree = found.found.tree
     workspace = scene.requirements.workspace
@@ -176,7 +176,7 @@ def test_a_cell_with_a_sample_too_few_is_caught():
     """The attack above sees a superset that isn't one."""
     scene, template = stage_for(SHAPES["ring"], "parallel")
     rows = scene.target_samples(Draw(300, 5))
-    found = bound_projectors(scene, template, rows, question(250, 9), QUICK)
+    found = bound_projectors(scene, (template,), rows, question(250, 9), QUICK)
     tree = found.found.tree
     towards = np.array([0.1, -0.2, 0.97]) / np.linalg.norm([0.1, -0.2, 0.97])
     lit = lit_by_hand(
@@ -197,7 +197,7 @@ def test_cells_hold_the_cone_and_what_is_over_the_floor(light):
     options = {"axis": tuple(axis), "half_angle": 0.9, "floor_m": 0.3}
     scene, template = stage_for(mesh, light, **options)
     rows = scene.target_samples(Draw(200, 5))
-    found = bound_projectors(scene, template, rows, question(100, 3), QUICK)
+    found = bound_projectors(scene, (template,), rows, question(100, 3), QUICK)
     tree, workspace = found.found.tree, scene.requirements.workspace
     near, far = workspace.projector_radius_m
     rng = np.random.default_rng(2)
@@ -252,7 +252,7 @@ def test_rooms_planes_and_keep_out_volumes_empty_cells_and_only_theirs(light):
     }
     scene, template = stage_for(SHAPES["ring"], light, **options)
     rows = scene.target_samples(Draw(200, 5))
-    found = bound_projectors(scene, template, rows, question(100, 3), QUICK)
+    found = bound_projectors(scene, (template,), rows, question(100, 3), QUICK)
     tree, workspace = found.found.tree, scene.requirements.workspace
     near, far = workspace.projector_radius_m
     rng = np.random.default_rng(2)
@@ -379,14 +379,16 @@ def test_cells_that_are_left_are_where_the_better_cover_is():
     """Two poses light a cube; a cover of three is improved where the cells point."""
     scene, template = stage_for(box((0.1, 0.1, 0.1), divisions=4), "parallel")
     rows = scene.target_samples(Draw(600, 3))
-    found = bound_projectors(scene, template, rows, question(600, 3), DEFAULT)
+    found = bound_projectors(scene, (template,), rows, question(600, 3), DEFAULT)
     assert found.found.lower_bound == 2
     corners = np.abs(found.directions)
     np.testing.assert_allclose(corners, 3**-0.5, atol=0.15)
     assert len(corners) == 2
     # More may be asked for: where the multipliers say that much is to be had.
     asked = replace(DEFAULT, offers=40)
-    more = bound_projectors(scene, template, rows, question(600, 3), asked).directions
+    more = bound_projectors(
+        scene, (template,), rows, question(600, 3), asked
+    ).directions
     assert len(more) == 42
     np.testing.assert_allclose(np.linalg.norm(more, axis=1), 1.0)
     assert continuous.PROVE.finest > DEFAULT.finest

@@ -86,7 +86,7 @@ def test_a_ball_wider_than_the_beam_is_served_by_several():
     beam = replace(rig.projector_device(), beam_radius=0.06)
     eye, radii = np.eye(4), np.array([0.1, 0.3])
     template = PlannedProjector("", "parallel", eye, eye, beam, radii)
-    stage = plan_projectors(scene, template, 200, rounds=1)
+    stage = plan_projectors(scene, (template,), 200, rounds=1)
     share = stage.candidates.lit.mean(axis=0)
     # A cap holds a tenth: four are too few for half of the ball, were they apart.
     assert share == pytest.approx(0.5 * (1 - np.sqrt(1 - 0.36)), abs=0.03)

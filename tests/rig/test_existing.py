@@ -185,10 +185,10 @@ def shining(name, towards, aside=0.0):
 )
 def test_the_fewest_over_all_poses_count_those_that_are_given(existing, count, idle):
     scene, template = ball_scene(existing)
-    stage = plan_projectors(scene, template, 300, rounds=1)
+    stage = plan_projectors(scene, (template,), 300, rounds=1)
     assert stage.certificate.given == len(existing)
     effort = Effort(finest=6, budget=1e9, shadows=np.inf, most_samples=600)
-    stage = prove_fewest(scene, stage, template, effort)
+    stage = prove_fewest(scene, stage, (template,), effort)
     proof = stage.certificate
     assert (proof.count, proof.status) == (count, "optimal")
     entry = proof.continuous

@@ -26,6 +26,14 @@ from planning.rig.rig import load_rig
 from planning.rig.rig_devices import farthest_off, straighter_focus
 
 BALL = 0.13
+
+
+def fit_of(rig, kind, size):
+    """How the only model of a kind suits an object."""
+    (model,) = rig.models(kind)
+    return rig.fit(model, size)
+
+
 # The default camera: 12 mm on 3.45 um, 2048 x 1536 px, 1 px of blur, 1 m +- 50 mm.
 FOCAL_PX, PIXEL_M, DISTANCE = 12e-3 / 3.45e-6, 3.45e-6, 1.0 + BALL
 
@@ -68,7 +76,7 @@ def test_depths_that_no_lens_images_are_refused():
 
 
 def test_a_ball_in_a_centred_image_has_closed_forms():
-    fit = make_rig().fit("camera", ObjectSize.ball(BALL))
+    fit = fit_of(make_rig(), "camera", ObjectSize.ball(BALL))
     disc = math.pi * (BALL * FOCAL_PX / DISTANCE) ** 2
     assert fit.share == pytest.approx(disc / (2048 * 1536))
     width, height = fit.field_m
@@ -83,7 +91,7 @@ def test_a_ball_in_a_centred_image_has_closed_forms():
 
 
 def test_the_longest_lens_of_a_shifted_projector_is_the_longest_that_holds_the_ball():
-    fit = make_rig().fit("projector", ObjectSize.ball(BALL))
+    fit = fit_of(make_rig(), "projector", ObjectSize.ball(BALL))
     best = fit.fitting.focal_px / fit.device.focal_px
     for factor, holds in ((0.999, True), (1.001, False), (2.0, False)):
         matrix = fit.device.camera_matrix * [[factor, 1, 1], [1, factor, 1], [1, 1, 1]]
@@ -97,7 +105,7 @@ def test_the_longest_lens_of_a_shifted_projector_is_the_longest_that_holds_the_b
 
 def test_a_lens_too_long_to_be_sharp_gives_way_to_one_that_is():
     """A ball of 20 mm: what would fill the image has no depth at any stop."""
-    fit = make_rig().fit("camera", ObjectSize.ball(0.01))
+    fit = fit_of(make_rig(), "camera", ObjectSize.ball(0.01))
     near, far = fit.depths_m
     focal = fit.fitting.focal_px * PIXEL_M
     assert focal < 768 * PIXEL_M / math.tan(math.asin(0.01 / 1.01))
@@ -115,7 +123,7 @@ def test_a_lens_longer_than_the_distance_is_never_called_sharp(write):
 
 
 def test_parallel_light_fits_by_its_pixels():
-    fit = make_rig("parallel").fit("projector", ObjectSize.ball(BALL))
+    fit = fit_of(make_rig("parallel"), "projector", ObjectSize.ball(BALL))
     assert fit.fitting.pixel_pitch_m == pytest.approx(2 * BALL / 768)
     assert fit.share == pytest.approx(math.pi * BALL**2 / (1024 * 768 * 0.8e-3**2))
     assert fit.standoff_that_holds_m is None

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -177,19 +178,15 @@ def plan_file(handmade, tmp_path):
 class _RigOf:
     """The optics of a plan's devices, as a rig gives them."""
 
-    name = "theirs"
+    name, housing = "theirs", None
 
     def __init__(self, plan):
         self.plan = plan
 
-    def projector_device(self):
-        return self.plan.projectors[0].device
-
-    def camera_device(self):
-        return self.plan.cameras[0].device
-
-    def camera_body(self):
-        return None
+    def models(self, kind):
+        device = getattr(self.plan, f"{kind}s")[0].device
+        body = self.housing if kind == "camera" else None
+        return (SimpleNamespace(name="", device=device, body=body),)
 
 
 def test_devices_of_a_plan_stand_where_it_says_by_their_ids(plan_file):
@@ -243,5 +240,5 @@ def test_housings_of_a_plan_arent_left_behind(plan_file):
     with pytest.raises(InputError, match=r"C1 has a housing, .* 'theirs' none; give"):
         read_mounted(path, _RigOf(plan))
     housed = _RigOf(plan)
-    housed.camera_body = lambda: Body((0.0, 0.0, 0.0), (0.02, 0.02, 0.04))
+    housed.housing = Body((0.0, 0.0, 0.0), (0.02, 0.02, 0.04))
     assert len(read_mounted(path, housed, ["C1"]).tables) == 1

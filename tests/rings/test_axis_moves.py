@@ -62,7 +62,9 @@ def ball(request):
     wanted = np.array([[0.88, -0.46, 0.1], [0.92, 0.38, 0.1]])
     projectors = tuple(offered[i] for i in np.argmax(wanted @ stands.T, axis=1))
     camera = make_camera(rig)
-    cover = plan_cameras(scene, projectors, camera_candidate_views(scene, camera, 60))
+    cover = plan_cameras(
+        scene, projectors, camera_candidate_views(scene, (camera,), 60)
+    )
     return scene, projectors, cover
 
 

@@ -37,9 +37,9 @@ def stages(scene):
     tilt = rig.ring_offset
     radii = uniform_radii(tilt + 0.15 if parallel else 0.3, 0.0035)
     template = make_projector(rig, radii, (tilt, -np.pi / 2))
-    projectors = plan_projectors(made, template, 200)
+    projectors = plan_projectors(made, (template,), 200)
     camera = make_camera(rig)
-    offered = camera_candidate_views(made, camera, 160)
+    offered = camera_candidate_views(made, (camera,), 160)
     cover = plan_cameras(made, projectors.projectors, offered)
     cameras = camera_stage(made, cover)
     return made, projectors, cameras

@@ -329,7 +329,7 @@ def test_existing_bodies_that_overlap_are_refused(scene):
         pair = (standing("left", 0.0), standing("right", x))
         required = replace(scene.requirements, existing=pair)
         check_existing_clearance(
-            replace(scene, requirements=required), projector(), camera()
+            replace(scene, requirements=required), (projector(),), (camera(),)
         )
 
     checked(0.11)
@@ -386,7 +386,7 @@ def test_the_clearance_binds_what_is_planned_and_nothing_but_housings(scene):
     )
     required = replace(old.requirements, existing=(left, right))
     standing = replace(old, requirements=required)
-    check_existing_clearance(standing, projector(), camera())
+    check_existing_clearance(standing, (projector(),), (camera(),))
     near, far = camera(-0.12, 0.0), camera(-0.16, 0.0)
     assert lacks_clearance(standing, near) == "the body of left"
     assert lacks_clearance(standing, far) == ""
@@ -559,9 +559,9 @@ def test_bodies_of_a_rig_file_reach_devices_plan_and_existing(rig_of):
     beam = FRAME.replace("camera", "parallel_projector")
     rig = rig_of(FRAME + beam + old.format("a", 0) + old.format("b", 500) + own)
     body = Body((0.0, 0.005, -0.04), (0.03, 0.035, 0.06))
-    assert rig.camera_body() == body
-    assert rig.projector_body() is None
-    parallel = rig_of(FRAME + beam, "parallel").projector_body()
+    assert rig.camera_models[0].body == body
+    assert rig.projector_models[0].body is None
+    parallel = rig_of(FRAME + beam, "parallel").projector_models[0].body
     assert parallel is not None
     assert np.allclose(parallel.centre_m, body.centre_m)
     assert np.allclose(rig.to_document()["camera"]["body"]["half_m"], body.half_m)

@@ -67,7 +67,7 @@ def readied(mesh, light, incidence, most=9, share=0.99, **workspace):
     )
     bare = np.zeros_like(ready.scene.steep)
     scene = replace(ready.scene, requirements=required, steep=bare)
-    return scene, ready.template
+    return scene, ready.templates[0]
 
 
 def most_lit(device, incidence):
@@ -108,8 +108,8 @@ def test_a_plate_takes_as_many_beams_as_its_area_asks_for(
     )
     least = 0.98 * sides[0] * sides[1] / most_lit(template.device, incidence)
     assert count - 1 < least <= count
-    stage = plan_projectors(scene, template, 60, rounds=1)
-    stage = prove_fewest(scene, stage, template, EFFORT)
+    stage = plan_projectors(scene, (template,), 60, rounds=1)
+    stage = prove_fewest(scene, stage, (template,), EFFORT)
     needed = stage.certificate.needed
     assert (needed.count, needed.lower_bound) == (count, count)
     assert stage.certificate.continuous.lower_bound <= count
@@ -150,7 +150,7 @@ def test_two_beams_that_leave_a_gap_are_moved_together():
     dark = ~np.any(lattice.lit[:, [0, 2]], axis=1)
     assert dark.mean() == pytest.approx(0.061 / 1.4, abs=0.01)
     found = one_fewer(
-        CandidateSource(scene, template),
+        CandidateSource(scene, (template,)),
         lattice,
         2,
         finer=lambda: lattice,
@@ -189,7 +189,7 @@ def test_one_beam_too_few_says_how_wide_two_must_be():
     scene, template = readied(
         grid(1.4, 0.55, divisions=(6, 4)), "parallel", 15.0, most=1, share=1.0
     )
-    stage = plan_projectors(scene, template, 60, rounds=1)
+    stage = plan_projectors(scene, (template,), 60, rounds=1)
     said = wider_field(scene, stage, 1)
     points = stage.candidates.samples.samples.points[:2000, :2]
     upright = 1e3 * np.hypot(*points.T).max()
@@ -201,7 +201,7 @@ def test_one_beam_too_few_says_how_wide_two_must_be():
 def test_one_image_too_few_is_wide_enough_from_as_far_as_it_is_sharp():
     """What counts is up to r from the middle, at asin(r / 1.77) degrees or more."""
     scene, template = readied(askew(1.5, 0.66), "diverging", 40.0, most=1, share=0.95)
-    stage = plan_projectors(scene, template, 60, rounds=1)
+    stage = plan_projectors(scene, (template,), 60, rounds=1)
     said = wider_field(scene, stage, 1)
     degrees = int(said.removeprefix("an image that reaches ").split(" degrees")[0])
     off = np.hypot(*stage.candidates.samples.samples.points[:2000, :2].T)
@@ -373,7 +373,7 @@ def test_cameras_stand_side_by_side_over_what_only_they_are_too_narrow_for():
     assert space.camera_standoff_m == 1.0
     device = load_rig("default", "parallel").camera_device()
     template = PlannedCamera("", np.eye(4), device)
-    few = camera_candidate_views(scene, template, 60).cameras
+    few = camera_candidate_views(scene, (template,), 60).cameras
     assert 60 < len(few) <= 6 * 60
     places = np.stack([c.world_from_device[:3, 3] for c in few])
     assert outside_by(places, space.camera_radius_m, space).max() <= 1e-9

@@ -153,7 +153,7 @@ def route_among(
     few = taken(samples, some, samples.lit)
     reachable = np.any(measured[some], axis=1)
     on = BaselineSamples(scene, projectors, few)
-    cover = candidate_cover(scene, measured[some], few)
+    cover = candidate_cover(scene, measured[some], few, candidates.cameras)
     route = paper_route(route_problem(on, candidates, cover))
     if not route.by_count:
         raise InfeasibleLimitsError(
@@ -188,7 +188,7 @@ def _judged(
     bounded_on: int = 0,
 ) -> RouteCameras:
     """Say with how many of its cameras, at least so many, the route is enough."""
-    cover = candidate_cover(scene, measured, samples)
+    cover = candidate_cover(scene, measured, samples, candidates.cameras)
     enough = (
         n
         for n, chosen in sorted(by_count.items())
@@ -220,11 +220,13 @@ def route_problem(
     required = max(0, cover.quotas.total - int(free.sum()))
     wanted = taken(on.lit, np.flatnonzero(~free), on.lit.lit)
 
+    devices = (candidates.cameras[0].device,)
+
     def least(count: int) -> int:
         if not required:
             return n
         question = BoundQuestion(required, count - n, len(free), 1.0)
-        return n + rough_bound(scene, candidates.cameras[0].device, wanted, question)
+        return n + rough_bound(scene, devices, wanted, question)
 
     return RouteProblem(
         on.surface,
@@ -285,7 +287,8 @@ def cover_of(
 
 
 def _selection(scene: Scene, samples: LitSamples, route: RouteCameras) -> Selection:
-    cover = candidate_cover(scene, route.measured, samples)
+    cameras = route.candidates.cameras
+    cover = candidate_cover(scene, route.measured, samples, cameras)
     bound = solve_cover(cover.problem, seed=scene.seed, heaviest=False)
     allowed = min(route.best, cover.max_count or route.best)
     chosen = smallest = route.by_count[allowed]

@@ -192,13 +192,13 @@ def _warnings(path: Path, object_mm: float) -> Iterator[str]:
         yield f"it doesn't plan yet: {error}"
         return
     size = ObjectSize.ball(1e-3 * _BALL * object_mm)
-    for role in ("projector", "camera"):
-        fit = rig.fit(role, size)
+    models = (*rig.projector_models, *rig.camera_models)
+    for fit in (rig.fit(model, size) for model in models):
         if not fit.device.holds_ball(fit.radius_m, fit.middle_m):
             yield (
-                f"one view of the object takes {fit.images} images of the {role} side "
-                f"by side; {fit.advice()}"
+                f"one view of the object takes {fit.images} images of the {fit.role} "
+                f"side by side; {fit.advice()}"
             )
         elif not fit.is_sharp:
-            yield f"not all of it is sharp for the {role}; {fit.advice()}"
+            yield f"not all of it is sharp for the {fit.role}; {fit.advice()}"
     yield from (f"  {note}" for note in rig.notes())

@@ -130,6 +130,7 @@ class ProjectorRecord(Part):
         world_from_mount: Pose of its thread or flange; None: the rig doesn't say.
         rings: None: the run was cut before they were spaced.
         exposure: Absent where the rig says nothing of light.
+        model: Name of its model, where the rig has several or counts them.
     """
 
     id: str
@@ -151,6 +152,7 @@ class ProjectorRecord(Part):
     rings: RingsRecord | None = None
     ring_shares: RingSharesRecord | None = None
     exposure: ExposureRecord | None = None
+    model: str = ""
 
     def planned(self) -> PlannedProjector:
         """Return the projector.
@@ -168,6 +170,7 @@ class ProjectorRecord(Part):
             self.name if self.existing else "",
             self.body,
             exposure_s=None if self.exposure is None else self.exposure.exposure_s,
+            model=self.model,
         )
 
     def _device(self) -> PinholeModel | ParallelModel:
@@ -192,6 +195,7 @@ class CameraRecord(Part):
         seen_area_m2: Area that it measures.
         sole_area_m2: Area that no other camera measures.
         world_from_mount: As of projectors.
+        model: As of projectors.
     """
 
     id: str
@@ -206,6 +210,7 @@ class CameraRecord(Part):
     world_from_mount: Pose | None = None
     existing: bool = False
     name: str = ""
+    model: str = ""
 
     def planned(self) -> PlannedCamera:
         """Return the camera.
@@ -218,7 +223,7 @@ class CameraRecord(Part):
         )
         pose = np.array(self.world_from_device)
         existing = self.name if self.existing else ""
-        return PlannedCamera(self.id, pose, device, existing, self.body)
+        return PlannedCamera(self.id, pose, device, existing, self.body, self.model)
 
 
 def projector_record(
@@ -253,12 +258,13 @@ def camera_record(
 def _described(
     device: PlannedProjector | PlannedCamera, record: type[Part]
 ) -> dict[str, Any]:
-    """Optics; body, and name of an existing device: no key where there is none."""
+    """Optics; body, names of device and model: no key where there is none."""
     optics = device.device.to_document().items()
     kept = {key: value for key, value in optics if key in record.model_fields}
     body = {} if device.body is None else {"body": device.body}
     name = {"existing": True, "name": device.existing} if device.existing else {}
-    return kept | body | name
+    model = {"model": device.model} if device.model else {}
+    return kept | body | name | model
 
 
 class BaselineRow(Part):

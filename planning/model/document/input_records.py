@@ -2,8 +2,10 @@
 
 from typing import Any, Literal
 
+import numpy as np
 from pydantic import Field
 
+from geometry.devices import ParallelModel, PinholeModel
 from planning.model.bodies import Body
 
 from .part import Interval, Matrix3, Part, Resolution, Vector3
@@ -116,7 +118,11 @@ class FiguresRecord(Part):
 
 
 class ModelRecord(Part):
-    """A device model of the rig: optics, figures as written, and their sources."""
+    """A device model of the rig: optics, figures as written, and their sources.
+
+    Attributes:
+        count: How many of it there are; None: any number.
+    """
 
     name: str = ""
     K: Matrix3 | None
@@ -129,10 +135,37 @@ class ModelRecord(Part):
     sources: dict[str, str] = Field(default={})
     body: Body | None = None
     light: str = ""
+    count: int | None = None
+
+    @property
+    def optics(self) -> PinholeModel | ParallelModel:
+        """Its optics; a plan keeps no distortion of projectors.
+
+        Raises:
+            ValueError: If they are none.
+        """
+        if self.K is not None:
+            bent = () if self.light else (self.distortion or ())
+            lens = np.zeros(5)
+            lens[: len(bent)] = bent
+            k1, k2, p1, p2, k3 = lens.tolist()
+            matrix = np.array(self.K)
+            return PinholeModel(
+                matrix, self.resolution, self.range_m, (k1, k2, p1, p2, k3)
+            )
+        if self.pixel_pitch_m is None:
+            raise ValueError("neither K nor pixel_pitch_m: one says what it images")
+        return ParallelModel(
+            self.resolution, self.pixel_pitch_m, self.range_m, self.beam_radius
+        )
 
 
 class RigRecord(Part):
-    """The resolved rig; tables whose keys end in _mm or _deg are as in its file."""
+    """The resolved rig; tables whose keys end in _mm or _deg are as in its file.
+
+    Attributes:
+        more_projectors: Other models than `projector`; of cameras likewise.
+    """
 
     name: str = ""
     description: str = ""
@@ -155,6 +188,12 @@ class RigRecord(Part):
     mounting: dict[str, float] = Field(default={})
     photometry: dict[str, Any] = Field(default={})
     clearance_m: float = 0.0
+    more_projectors: tuple[ModelRecord, ...] = ()
+    more_cameras: tuple[ModelRecord, ...] = ()
+
+    def models(self, kind: str) -> tuple[ModelRecord, ...]:
+        """Return the models of a `projector` or a `camera`, the first one first."""
+        return (getattr(self, kind), *getattr(self, f"more_{kind}s"))
 
 
 class ViolationRecord(Part):

@@ -13,11 +13,13 @@ image's bounds on |g| / |v| and on z / t (`image_cone`)::
     pitch   <= h |N.r| / ((t_c - e) |g|)                    must reach min_ring_pitch
     z       >= (t_c - e) cos(off axis),  z / (f |N.r|)      must not exceed the limit
 
-A sample stays if that holds for some projector that lights it. Bodies of devices are
-left out. The symbols and limits are those of `measurability`.
+A sample stays if that holds for some projector that lights it, and some model of the
+cameras. Bodies of devices are left out. The symbols and limits are those of
+`measurability`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,9 +32,18 @@ from planning.scene.limits.limit import may_hold
 from planning.scene.limits.pair_limits import PAIR_LIMITS, PairCell
 from planning.scene.measured import LitSamples
 
-from .image_cone import image_cone
+from .image_cone import ImageCone, image_cone
 
 _Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class _Lens:
+    """A model of the cameras, and the least noise of edges in it, (n_p, n) [px]."""
+
+    image: ImageCone
+    focal_px: float
+    noise_px: _Array
 
 
 class MeasurableCells:
@@ -42,23 +53,26 @@ class MeasurableCells:
         self,
         samples: LitSamples,
         required: Requirements,
-        device: PinholeModel,
+        devices: Sequence[PinholeModel],
         *,
         check_cancelled: Callable[[], None] = lambda: None,
     ) -> None:
         self._check_cancelled = check_cancelled
         self._camera, self._pair = required.camera, required.triangulation
-        self._image, self._focal = image_cone(device), device.focal_px
         normals = samples.target.samples.normals
         self._normals, self._lit = normals, samples.lit
         self._across = np.stack([ring.normals for ring in samples.surfaces])
         self._spacing = np.stack([ring.spacing for ring in samples.surfaces])
         cosines = np.stack([light.incidence_cos for light in samples.lights])
         errors = self._pair.limited_calibration
-        # So that times the least |g|, least_turn |v|, a turn moves a ray by |v|.
-        turned = errors.about_axis / self._image.least_turn
         edge = self._pair.noise_px / np.maximum(cosines, 1e-9)
-        self._noise = np.sqrt(edge**2 + turned**2 + errors.along_line_px**2)
+        self._lenses: list[_Lens] = []
+        for device in devices:
+            image = image_cone(device)
+            # So that times the least |g|, least_turn |v|, a turn moves a ray by |v|.
+            turned = errors.about_axis / image.least_turn
+            noise = np.sqrt(edge**2 + turned**2 + errors.along_line_px**2)
+            self._lenses.append(_Lens(image, device.focal_px, noise))
         levers = np.stack([ring.levers for ring in samples.surfaces])
         placed = surface_deviation(errors, levers)
         squarely = np.cos(self._camera.max_incidence)
@@ -85,20 +99,21 @@ class MeasurableCells:
         self._check_cancelled()
         cosine, sine = np.cos(psi), np.sin(psi)
         facing = _nearest(_dot(self._normals[samples], towards), cosine, sine)
-        depth = nearest * np.cos(self._image.off_axis)
-        cell = CellView(facing, depth, self._focal)
-        seen = may_hold(CAMERA_LIMITS, cell, self._camera, len(samples))
         admitted = np.zeros(samples.size, dtype=bool)
-        for p in range(self._lit.shape[1]):
-            at = np.flatnonzero(self._lit[samples, p] & seen & ~admitted)
-            k, u, c, s = samples[at], towards[at], cosine[at], sine[at]
-            crossing = _nearest(np.abs(_dot(self._across[p, k], u)), c, s)
-            turn = _least_sine(np.abs(_dot(self._along[p, k], u)), c, s)
-            g = nearest[at] * self._image.least_turn * self._width[p, k] * turn
-            noise, spacing = self._noise[p, k], self._spacing[p, k]
-            placed = self._placed[p, k]
-            pair = PairCell(crossing, facing[at], g, noise, spacing, placed)
-            admitted[at] = may_hold(PAIR_LIMITS, pair, self._pair, len(k))
+        for lens in self._lenses:
+            depth = nearest * np.cos(lens.image.off_axis)
+            cell = CellView(facing, depth, lens.focal_px)
+            seen = may_hold(CAMERA_LIMITS, cell, self._camera, len(samples))
+            for p in range(self._lit.shape[1]):
+                at = np.flatnonzero(self._lit[samples, p] & seen & ~admitted)
+                k, u, c, s = samples[at], towards[at], cosine[at], sine[at]
+                crossing = _nearest(np.abs(_dot(self._across[p, k], u)), c, s)
+                turn = _least_sine(np.abs(_dot(self._along[p, k], u)), c, s)
+                g = nearest[at] * lens.image.least_turn * self._width[p, k] * turn
+                noise, spacing = lens.noise_px[p, k], self._spacing[p, k]
+                placed = self._placed[p, k]
+                pair = PairCell(crossing, facing[at], g, noise, spacing, placed)
+                admitted[at] = may_hold(PAIR_LIMITS, pair, self._pair, len(k))
         return admitted
 
 

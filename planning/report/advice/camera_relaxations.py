@@ -8,7 +8,6 @@ least that is enough. Light, rings and ring axes stay as they are planned.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -29,7 +28,7 @@ from planning.scene.limits.pair_limits import CAUSES, MEASURED
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.measured import LitSamples, lit_samples, taken
 from planning.scene.scene import Scene
-from planning.scene.workspace.candidates import Candidates
+from planning.scene.workspace.model_candidates import ModelCandidates, one_of_each
 
 from .demands import Demands, demands
 from .least_changes import (
@@ -73,12 +72,9 @@ def out_of_reach(
     stepped = mount is not None and mount.is_stepped
     larger = larger_workspaces(required.workspace, "camera")
     for change, whole in larger if share.wanted > 0 or stepped else ():
-        camera = devices.reference_cameras[0]
-        site = scene.site("camera", camera.device)
-        site_there = None if site is None else replace(site, workspace=whole)
-        anywhere = Candidates(camera, whole, site_there).over(
-            required.workspace.n_reference_cameras
-        )
+        models = one_of_each(devices.reference_cameras)
+        there = ModelCandidates.over_scene(scene, models, whole)
+        anywhere = there.over(required.workspace.n_reference_cameras)
         changes[change] = int(measured_by_any(among, anywhere, unmeasured).sum())
     counts = np.bincount(asked.furthest[out], minlength=MEASURED)
     by_cause = {

@@ -102,8 +102,7 @@ def _enough(
 
     if (lack := wanted(samples.lit, samples.by_projectors)) > 0:
         dark = samples.target.take(inside & ~samples.lit)
-        device = devices.projectors[0].device
-        relaxations = relaxations_of_projectors(required, device)
+        relaxations = relaxations_of_projectors(required, devices.projectors)
         asked = reduce(
             np.minimum,
             (light_demands(scene, p, dark, relaxations) for p in devices.projectors),

@@ -7,14 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.devices import DeviceModel, PinholeModel
+from geometry.devices import PinholeModel
 from planning.model.document.coverage_records import Relaxation
+from planning.model.planned import PlannedProjector
 from planning.model.requirements import Requirements, Workspace
 from planning.proofs.selection import cover_problem
 from planning.rig import optics
 from planning.rig.rig import Rig
 from planning.rig.rig_tables import PinholeTable
-from planning.rings.ring_radii import ring_gap
+from planning.rings.ring_radii import widest_ring_gap
 from planning.scene.limits.limit import Array, Focus, LimitRelaxation, Mask, RigFacts
 from planning.scene.limits.pair_limits import MEASURED_LIMITS
 from planning.scene.limits.projector_limits import PROJECTOR_LIMITS
@@ -117,10 +118,11 @@ def least_enough(
 
 
 def relaxations_of_projectors(
-    required: Requirements, device: DeviceModel
+    required: Requirements, projectors: Sequence[PlannedProjector]
 ) -> tuple[LimitRelaxation, ...]:
-    """Return every way in which a limit of the projectors may give way."""
-    facts = RigFacts(required, device)
+    """Return every way in which a limit of projectors such as these may give way."""
+    several = len({projector.model for projector in projectors}) > 1
+    facts = RigFacts(required, projectors[0].device, several_models=several)
     return tuple(r for limit in PROJECTOR_LIMITS for r in limit.relaxations(facts))
 
 
@@ -128,12 +130,17 @@ def relaxations_of_cameras(
     rig: Rig, required: Requirements
 ) -> tuple[LimitRelaxation, ...]:
     """Return every way in which a limit of the cameras or of pairs may give way."""
-    device, limits = rig.camera_device(), required.triangulation
-    gap = rig.ring_gap_m or ring_gap(
-        rig.projector_device(), device, limits, rig.standoff_m
+    device, gap = rig.camera_device(), rig.ring_gap_m
+    if gap is None:
+        gap = widest_ring_gap(*rig.optics, required.triangulation, rig.standoff_m)
+    facts = RigFacts(
+        required,
+        device,
+        _focus(rig.table.camera, device),
+        gap,
+        rig.ring_gap_m is None,
+        len(rig.camera_models) > 1,
     )
-    focus = _focus(rig.table.camera, device)
-    facts = RigFacts(required, device, focus, gap, rig.ring_gap_m is None)
     return tuple(r for limit in MEASURED_LIMITS for r in limit.relaxations(facts))
 
 

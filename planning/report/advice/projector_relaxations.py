@@ -21,6 +21,7 @@ from planning.scene.limits.projector_limits import LIT
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import Candidates
+from planning.scene.workspace.model_candidates import ModelCandidates, one_of_each
 from planning.scene.workspace.view_tiles import Site
 
 from .demands import light_demands
@@ -56,10 +57,10 @@ def reachability_relaxations(
         furthest = furthest_lit(rest, reference, dark)
         gained[f"{moved} out of the way"] = int((furthest == LIT).sum())
     for change, larger in larger_workspaces(workspace, "projector"):
-        site = scene.site("projector", reference[0].device)
-        site_there = None if site is None else replace(site, workspace=larger)
-        anywhere = Candidates(reference[0], larger, site_there).over(
-            len(reference) if site is None else workspace.n_reference_projectors
+        there = ModelCandidates.over_scene(scene, one_of_each(reference), larger)
+        tiled = workspace.projector_standoff_m is not None
+        anywhere = there.over(
+            workspace.n_reference_projectors if tiled else len(reference)
         )
         still_dark = furthest_lit(scene, anywhere, target) < LIT
         gained[change] = len(dark) - int(still_dark.sum())
@@ -82,7 +83,7 @@ def _least(
     scene: Scene, projectors: Sequence[PlannedProjector], dark: Target, wanted: int
 ) -> dict[str, int]:
     """How far each limit alone must give way, and how many dark samples that lights."""
-    relaxations = relaxations_of_projectors(scene.requirements, projectors[0].device)
+    relaxations = relaxations_of_projectors(scene.requirements, projectors)
     asked = (light_demands(scene, p, dark, relaxations) for p in projectors)
     return least_changes(relaxations, reduce(np.minimum, asked), wanted)
 
@@ -103,7 +104,7 @@ def wider_field(scene: Scene, stage: ProjectorStage, count: int) -> str | None:
     target = candidates.samples.take(np.arange(n))
     (field,) = (
         relaxation
-        for relaxation in relaxations_of_projectors(required, template.device)
+        for relaxation in relaxations_of_projectors(required, stage.reference[:1])
         if relaxation.cause == "projector_beam"
     )
     poses = (*stage.reference, *_over_larger_tiles(site, template))

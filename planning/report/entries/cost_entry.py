@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from math import prod
 
 from planning.model.document.device_records import CameraRecord, ProjectorRecord
-from planning.model.document.input_records import RigRecord
+from planning.model.document.input_records import FiguresRecord, RigRecord
 from planning.model.document.plan_document import CostRecord
 from planning.rings.acquisition import frame_time, n_frames
 
@@ -46,7 +46,7 @@ def cost_record(
     pixels = sum(prod(camera.resolution) for camera in cameras)
     n_rings, frame_s = (
         [len(one.ring_radii) for one in projectors],
-        _frame_time(rig, projectors),
+        _frame_time(rig, projectors, cameras),
     )
     shown = n_frames(n_rings, len(cameras))
     t4 = sum(stages.get(name, 0.0) for name in _PROJECTOR_STAGES)
@@ -86,12 +86,31 @@ def cost_record(
     return known.changed(**totals)
 
 
-def _frame_time(rig: RigRecord, projectors: Sequence[ProjectorRecord]) -> float | None:
-    """Of the longest exposure: as planned, or else as the rig states it."""
-    camera, projector = rig.camera.figures, rig.projector.figures
-    exposures = [one.exposure.exposure_s for one in projectors if one.exposure]
-    if camera.exposure_ms is not None and not exposures:
-        exposures = [1e-3 * camera.exposure_ms]
-    return frame_time(
-        camera.frame_rate_hz, projector.frame_rate_hz, max(exposures, default=None)
+def _frame_time(
+    rig: RigRecord,
+    projectors: Sequence[ProjectorRecord],
+    cameras: Sequence[CameraRecord],
+) -> float | None:
+    """Of the longest exposure, planned or else stated, and of the slowest models."""
+    lamps, eyes = (
+        _figures(rig, "projector", projectors),
+        _figures(rig, "camera", cameras),
     )
+    exposures = [one.exposure.exposure_s for one in projectors if one.exposure]
+    if not exposures:
+        exposures = [1e-3 * each.exposure_ms for each in eyes if each.exposure_ms]
+    return frame_time(_slowest(eyes), _slowest(lamps), max(exposures, default=None))
+
+
+def _figures(
+    rig: RigRecord, kind: str, records: Sequence[ProjectorRecord | CameraRecord]
+) -> list[FiguresRecord]:
+    """The figures of the models that devices are of."""
+    taken, models = {record.model for record in records}, rig.models(kind)
+    return [m.figures for m in models if m.name in taken] or [models[0].figures]
+
+
+def _slowest(figures: Sequence[FiguresRecord]) -> float | None:
+    rates = [each.frame_rate_hz for each in figures]
+    known = [rate for rate in rates if rate is not None]
+    return min(known) if len(known) == len(rates) else None

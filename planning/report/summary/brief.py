@@ -21,6 +21,7 @@ from .proof_lines import user_selection
 from .region_lines import worst_region
 from .robust_lines import robust_cost
 from .shortfall import Shortfall, missing
+from .stock_words import models_line, used_up
 from .summary import lost_in_field
 from .warning_lines import warnings
 
@@ -41,7 +42,9 @@ def brief(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
     """
     known = {str(one): one for one in missing(plan)}
     short = [known.get(line, Shortfall(line, line)) for line in missed]
+    models = models_line(plan.document)
     blocks = [
+        *([("MODELS", models, 3)] if models else []),
         *_measured(plan),
         *_fewest(plan),
         *_robust(plan),
@@ -179,7 +182,7 @@ def _fewest(plan: RigPlan) -> Iterator[_Block]:
         )
         return
     for label, (kind, proof) in zip(("FEWEST", ""), kinds.items(), strict=True):
-        yield label, _proved(kind, proof), 2
+        yield label, _proved(kind, proof, used_up(plan.document, kind)), 2
 
 
 def _robust(plan: RigPlan) -> Iterator[_Block]:
@@ -203,12 +206,14 @@ def _over_all(proof: Certificate) -> bool:
     )
 
 
-def _proved(kind: str, proof: Certificate) -> str:
+def _proved(kind: str, proof: Certificate, gone: str) -> str:
     needed, least = proof.needed, proof.candidates.lower_bound
     over, count = "over the candidates", count_words(proof.count, kind)
     if needed.count > proof.count:
         words = f"at least {needed.lower_bound} {kind}s proved {over}, "
-        return f"{words}{needed.count} suffice; at most {proof.count} was asked"
+        most = f"no more of {gone} in stock"
+        most = most if gone else f"at most {proof.count} was asked"
+        return f"{words}{needed.count} suffice; {most}"
     if proof.status != "optimal":
         return f"{count}; at least {least} {_are(least)} needed {over}"
     if proof.continuous is None:

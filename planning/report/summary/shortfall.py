@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 from planning.model.document.certificates import Certificate
 from planning.model.document.coverage_records import Coverage, Relaxation
-from planning.model.document.input_records import EvaluationRecord
 from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
 from planning.model.requirements import Requirements
@@ -16,6 +15,7 @@ from planning.scene.limits.projector_limits import PROJECTOR_LIMITS
 
 from .cause_words import areas_line, causes_line, rounded_down
 from .region_lines import floor_shortfalls
+from .stock_words import used_up
 
 
 @dataclass(frozen=True)
@@ -176,7 +176,7 @@ def _covered(document: PlanDocument, requirements: Requirements) -> Iterator[Sho
             f"{percent(required)} is required; {area_words(whole - covered)} of "
             f"{area_words(whole)} are left{_bodies(document.coverage, proof)}."
             f"{_why(kind, document.coverage)}",
-            _remedies(kind, proof, requirements, share, document.evaluation),
+            _remedies(kind, document, share),
         )
 
 
@@ -213,21 +213,19 @@ def _bodies(coverage: Coverage, proof: Certificate) -> str:
     return f" ({', '.join(phrases)})" if phrases else ""
 
 
-def _remedies(
-    kind: str,
-    proof: Certificate,
-    requirements: Requirements,
-    share: float,
-    evaluation: EvaluationRecord | None,
-) -> tuple[str, ...]:
-    needed = proof.needed
-    allowed = getattr(requirements, f"max_{kind}")
+def _remedies(kind: str, document: PlanDocument, share: float) -> tuple[str, ...]:
+    proof: Certificate = getattr(document.certificates, kind)
+    needed, requirements = proof.needed, document.requirements
+    evaluation, allowed = document.evaluation, getattr(requirements, f"max_{kind}")
     option = "dominant-coverage" if kind == "projectors" else "coverage"
     accept = f"--{option} {rounded_down(share)} accepts this plan"
     if evaluation is not None:
         # A share of 0 is none that an option takes.
         more = f"`plan --fixed {evaluation.path}` keeps these and seeks more {kind}"
         return (more, f"or {accept}") if share > 0.0 else (more,)
+    if gone := used_up(document, kind.removesuffix("s")):
+        of_any = f"with any number of each {needed.count} would do"
+        return (f"more of {gone} in stock: {of_any}", f"or {accept}")
     # Where bodies are in the way, more devices may be no help.
     in_vain = needed.count <= proof.but_for_bodies
     if allowed is None or needed.count <= allowed or in_vain:

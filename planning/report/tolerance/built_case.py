@@ -1,7 +1,9 @@
 """A plan's claims, recomputed for devices that stand elsewhere."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +15,9 @@ from planning.model.calibration_errors import (
     Mounting,
 )
 from planning.model.device_poses import moved_to
+from planning.model.document.input_records import ModelRecord
 from planning.model.plan import RigPlan
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.report.judged import Devices, Judged
 from planning.scene.camera_views import camera_views
 from planning.scene.draws import DRAWS
@@ -31,6 +35,7 @@ from .retriangulation import retriangulated
 
 _Array = NDArray[np.float64]
 _Mask = NDArray[np.bool_]
+_D = TypeVar("_D", PlannedProjector, PlannedCamera)
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,24 +265,41 @@ def scene_of(plan: RigPlan, *, threads: int) -> Scene:
 def _devices(plan: RigPlan) -> Devices:
     """A plan's devices, and what stands at its reference poses."""
     surface, workspace = plan.surface, plan.requirements.workspace
-    model, camera = plan.projectors[0], replace(plan.cameras[0], existing="")
-    widest = np.array([workspace.reference_ring_radius])
-    poses = zip(surface.reference_projectors, surface.reference_rings, strict=True)
+    rig, widest = plan.document.rig, np.array([workspace.reference_ring_radius])
+    lit = _templates(plan.projectors, rig.models("projector"))
+    views = _templates(plan.cameras, rig.models("camera"))
+    poses = zip(
+        surface.reference_projectors,
+        surface.reference_rings,
+        surface.models_of("projector"),
+        strict=True,
+    )
+    cameras = zip(surface.reference_cameras, surface.models_of("camera"), strict=True)
     return Devices(
         plan.projectors,
         plan.cameras,
         tuple(
             replace(
-                model,
+                lit[model],
                 world_from_device=pose,
                 world_from_ring=ring,
                 ring_radii=widest,
-                existing="",
             )
-            for pose, ring in poses
+            for pose, ring, model in poses
         ),
-        tuple(moved_to(camera, pose) for pose in surface.reference_cameras),
+        tuple(moved_to(views[model], pose) for pose, model in cameras),
     )
+
+
+def _templates(devices: Sequence[_D], models: Sequence[ModelRecord]) -> list[_D]:
+    """A device of each model that stands nowhere; the plan may hold none of it."""
+    like = replace(devices[0], existing="")
+    if len(models) == 1:
+        return [like]
+    return [
+        replace(like, device=model.optics, body=model.body, model=model.name)
+        for model in models
+    ]
 
 
 def _share(part: _Mask, whole: _Mask) -> float:

@@ -32,7 +32,7 @@ class Named:
 
     def resolved(self, tables: dict[str, Any]) -> dict[str, Any]:
         """Return tables that name nothing any more."""
-        tables = self._with_devices(tables)
+        tables = self._with_devices(self._parted(tables))
         # A preset may itself be laid over another.
         while (base := tables.pop("base", None)) is not None:
             if not isinstance(base, str) or base not in preset_names():
@@ -48,22 +48,43 @@ class Named:
                 tables[key] = self._with_preset(key, table)
         return tables
 
+    def _parted(self, tables: dict[str, Any]) -> dict[str, Any]:
+        """Part lists of devices into the first and more; these name nothing then."""
+        tables = dict(tables)
+        for role in DEVICES:
+            if not isinstance(given := tables.get(role), list):
+                continue
+            if not given:
+                self.faults.append(f"[[{role}]] is an empty list; write a device")
+                self.broken.add(role)
+            tables[role], *more = given or [{}]
+            tables[f"more_{role}s"] = [
+                self._named(role, entry, f"{role}[{place}]")
+                for place, entry in enumerate(more, 1)
+            ]
+        return tables
+
+    def _named(self, role: str, given: object, where: str) -> object:
+        """Return one table of devices that names nothing any more."""
+        if isinstance(given, str):
+            given = {"device": given}
+        if not isinstance(given, dict) or not {"device", "calibration"} & {*given}:
+            return given
+        try:
+            return self._device(role, given, where)
+        except (ValueError, RigError) as error:
+            self.faults.append(f"[{where}] {error}")
+            self.broken.add(where)
+            return given
+
     def _with_devices(self, tables: dict[str, Any]) -> dict[str, Any]:
         tables = dict(tables)
         for role in DEVICES:
-            given = tables.get(role)
-            if isinstance(given, str):
-                given = {"device": given}
-            if not isinstance(given, dict) or not {"device", "calibration"} & {*given}:
-                continue
-            try:
-                tables[role] = self._device(role, given)
-            except (ValueError, RigError) as error:
-                self.faults.append(f"[{role}] {error}")
-                self.broken.add(role)
+            if role in tables:
+                tables[role] = self._named(role, tables[role], role)
         return tables
 
-    def _device(self, role: str, given: dict[str, Any]) -> dict[str, Any]:
+    def _device(self, role: str, given: dict[str, Any], where: str) -> dict[str, Any]:
         table: dict[str, Any] = {}
         if (device := given.get("device")) is not None:
             table = device_table(role, device, given)
@@ -81,7 +102,7 @@ class Named:
         intrinsics = read_intrinsics(self._folder / file)
         size = table.get("resolution_px")
         if size is None:
-            self._calibrated[role] = file, intrinsics.resolution_px
+            self._calibrated[where] = file, intrinsics.resolution_px
         else:
             _check_size(file, intrinsics.resolution_px, size)
         return lay_device_over(table, intrinsics.figures())

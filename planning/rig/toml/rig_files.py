@@ -19,7 +19,7 @@ from planning.model.files import reading
 from planning.model.table_types import fault_words
 from planning.rig.rig_tables import RigTable
 
-from .laying import lay_over
+from .laying import DEVICES, lay_over
 from .named import WHOLE_FILE, Named
 from .preset_files import preset_names, preset_text
 
@@ -45,6 +45,8 @@ def read_rig(source: str | Path | Mapping[str, Any]) -> RigTable:
         table = RigTable.model_validate(tables)
     except ValidationError as error:
         entries = error.errors(include_url=False)
+        for entry in entries:
+            entry["loc"] = _in_list(entry["loc"])
         faults += [_fault(e) for e in entries if not _follows(e, named.broken)]
     if table is None or faults:
         raise RigError("\n".join(f"{where}: {fault}" for fault in faults))
@@ -55,7 +57,18 @@ def _follows(entry: ErrorDetails, broken: set[str]) -> bool:
     """Whether a fault is there only because a named thing wasn't found."""
     if entry["type"] == "missing" and WHOLE_FILE in broken:
         return True
-    return bool(entry["loc"]) and entry["loc"][0] in broken
+    loc = entry["loc"]
+    if len(loc) > 1 and loc[0] in DEVICES and isinstance(loc[1], int):
+        return f"{loc[0]}[{loc[1]}]" in broken
+    return bool(loc) and loc[0] in broken
+
+
+def _in_list(loc: tuple[int | str, ...]) -> tuple[int | str, ...]:
+    """Return where a device of a list stands: `more_cameras[0]` is the second."""
+    if len(loc) < 2 or not isinstance(loc[1], int):
+        return loc
+    name = str(loc[0]).removeprefix("more_").removesuffix("s")
+    return (name, loc[1] + 1, *loc[2:]) if name in DEVICES else loc
 
 
 def rig_folder(source: str | Path | Mapping[str, Any]) -> Path:
@@ -100,7 +113,8 @@ def _nearest_key(loc: tuple[int | str, ...]) -> str:
     """Say in which table a key belongs, or which of the same may have been meant."""
     # A number is a place in a list of tables.
     table = ".".join(part for part in loc[:-1] if isinstance(part, str))
-    tables, key = dict(_tables("", RigTable)), str(loc[-1])
+    tables = {k: v for k, v in _tables("", RigTable) if not k.startswith("more_")}
+    key = str(loc[-1])
     homes = [name for name, known in tables.items() if key in known]
     if "" in homes:
         return "it belongs above the first table"

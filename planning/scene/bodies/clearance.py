@@ -75,7 +75,9 @@ def candidates_with_clearance(
 
 
 def check_existing_clearance(
-    scene: Scene, projector: PlannedProjector, camera: PlannedCamera
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    cameras: Sequence[PlannedCamera],
 ) -> None:
     """Refuse existing devices whose bodies touch each other or the object.
 
@@ -84,8 +86,8 @@ def check_existing_clearance(
     """
     required = scene.requirements
     devices = (
-        *existing_devices(required, projector),
-        *existing_devices(required, camera),
+        *existing_devices(required, projectors),
+        *existing_devices(required, cameras),
     )
     for device in devices:
         if what := lacks_clearance(scene, device):

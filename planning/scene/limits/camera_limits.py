@@ -137,6 +137,8 @@ class CameraRange(InRange):
 
     def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:
         """Yield the blur that is let pass where it sets the range; else its ends."""
+        if facts.several_models:
+            return
         sharp, focus = facts.device.range_m, facts.focus
         if focus is None:
             yield from range_ends(self.name, "camera", sharp, sharp)

@@ -44,7 +44,8 @@ class RigFacts:
     """What relaxations are told of the rig file.
 
     The focus is of a camera whose range follows from it; `ring_gap_chosen` says whether
-    the planner chose the distance of neighbouring rings at the standoff.
+    the planner chose the distance of neighbouring rings at the standoff. Of several
+    models the device is the first, and no range is told of any.
     """
 
     required: Requirements
@@ -52,6 +53,7 @@ class RigFacts:
     focus: Focus | None = None
     ring_gap_m: float = 0.0
     ring_gap_chosen: bool = False
+    several_models: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -96,6 +96,8 @@ class ProjectorRange(InRange):
 
     def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:
         """Yield either end of the range."""
+        if facts.several_models:
+            return
         sharp = facts.device.range_m
         yield from islice(range_ends(self.name, "projector", sharp, sharp), 2)
 

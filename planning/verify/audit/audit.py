@@ -34,6 +34,7 @@ from planning.verify.audit.devices.evaluation_claims import audit_evaluation
 from planning.verify.audit.devices.exposure_claims import audit_exposures
 from planning.verify.audit.devices.mount_claims import audit_mounts
 from planning.verify.audit.devices.obstacle_claims import audit_obstacles
+from planning.verify.audit.devices.stock_claims import audit_stock
 from planning.verify.audit.devices.workspace_claims import audit_workspace
 from planning.verify.audit.devices.zone_claims import audit_zones
 from planning.verify.audit.rings.axis_claims import audit_ring_axes
@@ -53,6 +54,7 @@ _CLAIMS = (
     audit_evaluation,
     audit_exposures,
     audit_mounts,
+    audit_stock,
     audit_obstacles,
     audit_areas,
     audit_inside,

@@ -36,7 +36,7 @@ class DeviceKind:
     Attributes:
         name: `projector` or `camera`.
         records: As written in the plan; `devices` are built from them.
-        model: Of the rig.
+        models: Of the rig, the first one first.
         proof: Their certificate.
         most: How many are allowed; None: as many as it takes.
         covers: Whether each lights or measures each sample, shape (n_d, n).
@@ -50,7 +50,7 @@ class DeviceKind:
     name: str
     records: tuple[ProjectorRecord, ...] | tuple[CameraRecord, ...]
     devices: tuple[PlannedProjector, ...] | tuple[PlannedCamera, ...]
-    model: ModelRecord
+    models: tuple[ModelRecord, ...]
     proof: Certificate
     most: int | None
     covers: Mask
@@ -60,6 +60,10 @@ class DeviceKind:
     poses: Array
     n_poses: int
     shell: tuple[float, float]
+
+    def model_of(self, name: str) -> ModelRecord:
+        """Return the model of a device by its name; of none that is known the first."""
+        return next((m for m in self.models if m.name == name), self.models[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +126,7 @@ class AuditCase:
             name=name,
             records=getattr(document, f"{name}s"),
             devices=getattr(plan, f"{name}s"),
-            model=getattr(document.rig, name),
+            models=document.rig.models(name),
             proof=getattr(document.certificates, f"{name}s"),
             most=getattr(limits, f"max_{name}s"),
             covers=covers,

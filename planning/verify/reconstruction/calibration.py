@@ -19,6 +19,7 @@ from planning.verify.reconstruction.patterns.ring_patterns import (
 )
 
 from .arrays import Array, Mask
+from .defocus import Defocus
 from .light_laws import LIGHTS, LightLaw
 
 _UNDISTORT_STEPS = 60
@@ -68,9 +69,15 @@ class DeviceCalibration:
 
 @dataclass(frozen=True, eq=False)
 class CameraCalibration(DeviceCalibration):
-    """A camera: pinhole, Brown-Conrady lens k1, k2, p1, p2, k3, pose."""
+    """A camera: pinhole, Brown-Conrady lens k1, k2, p1, p2, k3, pose.
+
+    Attributes:
+        distortion: Of the lens.
+        focus: How it is focused; None: nobody says.
+    """
 
     distortion: tuple[float, ...]
+    focus: Defocus | None = field(default=None, kw_only=True)
 
     @property
     def focal_px(self) -> float:

@@ -11,6 +11,7 @@ from planning.model.calibration_errors import CalibrationErrors
 from planning.model.light.light_budget import LightBudget
 from planning.model.obstacles import Obstacle
 from planning.model.plan import RigPlan
+from planning.model.planned import PlannedProjector
 from planning.model.requirements import CheckLimits
 from planning.verify.reconstruction.patterns.response import Response
 from planning.verify.reconstruction.patterns.ring_patterns import Frame
@@ -23,45 +24,12 @@ from .calibration import (
     calibrate_camera,
     calibrate_projector,
 )
+from .defocus import Defocus, defocus_of, model_of
 
 # Rings that run more steeply along the viewing ray cross steps between surfaces, unless
 # the plan counts on surface seen at such incidence [rad].
 _SLANTED = np.deg2rad(65.0)
 _SLANT_MARGIN = np.deg2rad(5.0)
-
-
-@dataclass(frozen=True)
-class Defocus:
-    """A lens set to one distance.
-
-    Attributes:
-        focus_m: Distance of the plane in focus, along the axis [m].
-        aperture_m: Diameter of the entrance pupil, f / N [m].
-    """
-
-    focus_m: float
-    aperture_m: float
-
-    def blur_m(self, depth: Array) -> Array:
-        """Return the standard deviation of the blur at the object [m], any shape.
-
-        By similar triangles a point of the plane in focus is a disc of diameter c at
-        depth z [m], whose standard deviation along any line is c / 4::
-
-            c = A |z / z_0 - 1|
-        """
-        return 0.25 * self.aperture_m * np.abs(depth / self.focus_m - 1.0)
-
-
-def defocus_of(plan: RigPlan, role: str) -> Defocus | None:
-    """Return how a plan's `projector` or `camera` is focused; None: nobody says."""
-    rig = plan.document.rig
-    device = rig.projector if role == "projector" else rig.camera
-    focus, pixel_um = device.figures.focus, device.figures.pixel_um
-    if focus is None or pixel_um is None or device.K is None:
-        return None
-    focal_m = device.K[0][0] * pixel_um * 1e-6
-    return Defocus(focus.distance_mm * 1e-3, focal_m / focus.f_number)
 
 
 @dataclass(frozen=True)
@@ -113,7 +81,6 @@ class Scanner:
         target: Faces that are to be measured, shape (n_f,).
         limits: What is asked.
         projector_focus: How the projectors are focused; None: unknown.
-        camera_focus: Likewise of the cameras.
         groups: Ids of the projectors that shine at the same time.
         baselines: Of pairs of cameras that eq. (10) limits.
         obstacles: What stands about the object and isn't a device.
@@ -133,7 +100,6 @@ class Scanner:
     target: Mask
     limits: ScanLimits
     projector_focus: Defocus | None = None
-    camera_focus: Defocus | None = None
     groups: tuple[frozenset[str], ...] = ()
     baselines: tuple[BaselineLimit, ...] = ()
     obstacles: tuple[Obstacle, ...] = ()
@@ -147,14 +113,16 @@ class Scanner:
     def of(cls, plan: RigPlan) -> Self:
         """Return what a plan says."""
         document, wanted = plan.document, plan.requirements
-        response = Response(document.rig.projector.figures.response or 1.0)
         schedule = document.firing_schedule
         return cls(
+            tuple(_projector(plan, projector) for projector in plan.projectors),
             tuple(
-                replace(calibrate_projector(projector), response=response)
-                for projector in plan.projectors
+                replace(
+                    calibrate_camera(camera),
+                    focus=defocus_of(model_of(plan, "camera", camera.model)),
+                )
+                for camera in plan.cameras
             ),
-            tuple(calibrate_camera(camera) for camera in plan.cameras),
             plan.surface.mesh,
             plan.surface.region,
             plan.surface.target_faces(wanted.target),
@@ -165,8 +133,7 @@ class Scanner:
                 wanted.camera.max_incidence,
                 wanted.triangulation.max_sigma_m or np.inf,
             ),
-            defocus_of(plan, "projector"),
-            defocus_of(plan, "camera"),
+            defocus_of(document.rig.projector),
             tuple(frozenset(group) for group in (schedule.groups if schedule else ())),
             tuple(
                 BaselineLimit(frozenset(row.cameras), row.d, row.d_max)
@@ -204,3 +171,9 @@ class Scanner:
         """Return the other projectors that shine at the same time as one."""
         together = (group for group in self.groups if projector in group)
         return next(together, frozenset()) - {projector}
+
+
+def _projector(plan: RigPlan, projector: PlannedProjector) -> ProjectorCalibration:
+    model = model_of(plan, "projector", projector.model)
+    response = Response(model.figures.response or 1.0)
+    return replace(calibrate_projector(projector), response=response)

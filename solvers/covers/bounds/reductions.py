@@ -3,8 +3,9 @@
 Valid for partial cover: equal rows merge with added weight; column j goes if r columns
 that stay each serve all that j serves and cost no more, r the largest need among j's
 rows: wherever j is taken, one of them is free to take its place, or all are taken and j
-adds nothing. Where a kind's stock binds, its columns stand in only for their own. Row dominance is *not* valid for partial cover and isn't used here. Fixed
-sets are taken out with what they serve; rows that too few sets serve are lost.
+adds nothing. Where a kind's stock binds, its columns stand in only for their own. Row
+dominance is *not* valid for partial cover and isn't used here. Fixed sets are taken out
+with what they serve; rows that too few sets serve are lost.
 
 Weights become integers below 2^52 (a power of two times the given ones, rounded), kept
 as float64: sums of them are exact in any order, so neither BLAS nor the number of

@@ -46,9 +46,7 @@ def coverage_bounds(
     return np.minimum(bounds * (1.0 + rounding(clipped.size)), cover.total)
 
 
-def costliest(
-    cover: ReducedCover, payments: NDArray[np.float64]
-) -> NDArray[np.int64]:
+def costliest(cover: ReducedCover, payments: NDArray[np.float64]) -> NDArray[np.int64]:
     """Return the sets by what they pay, (k,), as many of each kind as its stock has.
 
     The first K of these are the K that pay most.

@@ -95,9 +95,7 @@ def test_what_is_fixed_counts_against_the_stock() -> None:
         ({"stock": [1, 2], "costs": [1.0, 2.0, 1.0, 1.0]}, "equal costs"),
     ],
 )
-def test_a_stock_that_is_none_is_refused(
-    change: dict[str, object], words: str
-) -> None:
+def test_a_stock_that_is_none_is_refused(change: dict[str, object], words: str) -> None:
     """Wrong shapes, numbers below 0, and what the searches don't count."""
     options: dict[str, object] = {"kinds": [0, 0, 1, 1]} | change
     with pytest.raises(ValueError, match=words):

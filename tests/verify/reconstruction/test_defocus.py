@@ -12,11 +12,11 @@ from planning.verify.reconstruction.calibration import (
     calibrate_camera,
     calibrate_projector,
 )
+from planning.verify.reconstruction.defocus import Defocus, defocus_of
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.render import render_pair
 from planning.verify.reconstruction.render.rendered_light import Shown
 from planning.verify.reconstruction.render.view import view
-from planning.verify.reconstruction.scanner import Defocus, defocus_of
 
 CLEAN = Photometry(noisy=False, albedo_variation=0.0)
 LENS = Defocus(focus_m=1.2, aperture_m=0.012)
@@ -42,19 +42,19 @@ def test_a_point_in_focus_is_a_disc_elsewhere():
 
 def test_focus_comes_from_the_rigs_figures(rigs):
     plan = rigs.small_rig(grid(0.1, 0.1, divisions=(2, 2)))
-    assert defocus_of(plan, "projector") is None
+    assert defocus_of(plan.document.rig.projector) is None
     known = RigPlan.from_document(
         plan.to_document() | figures("projector"), plan.surface
     )
-    lens = defocus_of(known, "projector")
+    lens = defocus_of(known.document.rig.projector)
     assert lens.focus_m == pytest.approx(1.2)
     assert lens.aperture_m == pytest.approx(0.0192 / 1.6)
-    assert defocus_of(known, "camera") is None
+    assert defocus_of(known.document.rig.camera) is None
     for changes in ({"K": None}, {"figures": {"pixel_um": 12.5}}):
         beam = RigPlan.from_document(
             plan.to_document() | figures("projector", **changes), plan.surface
         )
-        assert defocus_of(beam, "projector") is None
+        assert defocus_of(beam.document.rig.projector) is None
 
 
 def test_a_camera_out_of_focus_blurs_its_whole_image():

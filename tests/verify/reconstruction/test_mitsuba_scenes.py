@@ -9,6 +9,7 @@ from geometry.files.readers import load_mesh
 from geometry.shapes.primitives import sphere
 from planning.model.bodies import Body
 from planning.model.errors import InputError
+from planning.verify.reconstruction.defocus import Defocus
 from planning.verify.reconstruction.reconstruct import reconstruct
 from planning.verify.reconstruction.render.mitsuba.materials import (
     MATERIAL_NAMES,
@@ -31,7 +32,7 @@ from planning.verify.reconstruction.render.mitsuba.scene_text import (
     scene_text,
 )
 from planning.verify.reconstruction.render.photometry import Photometry
-from planning.verify.reconstruction.scanner import Defocus, Scanner
+from planning.verify.reconstruction.scanner import Scanner
 
 # Single precision: Mitsuba's rays are this exact [px].
 EXACT_PX = 2e-3
@@ -59,9 +60,8 @@ def scanner(request):
         projectors[1] = replace(projectors[1], matrix=stretched)
     return replace(
         rig,
-        cameras=tuple(cameras),
+        cameras=tuple(replace(one, focus=Defocus(1.1, 1e-3)) for one in cameras),
         projectors=tuple(projectors),
-        camera_focus=Defocus(1.1, 1e-3),
     )
 
 

@@ -2,6 +2,7 @@
 
 import math
 
+from planning.model.document.input_records import FiguresRecord
 from planning.model.document.plan_document import CostRecord
 from planning.model.plan import RigPlan
 from planning.verify.audit.audit_case import AuditCase
@@ -59,18 +60,26 @@ def _frames(plan: RigPlan, n_cameras: int, *, left_out: bool = False) -> int:
 
 
 def _frame_time(plan: RigPlan) -> float | None:
-    """Refreshes of the projector until the camera has exposed and is ready again."""
-    rig = plan.document.rig
-    rate, refresh = (
-        device.figures.frame_rate_hz for device in (rig.camera, rig.projector)
-    )
-    if not (rate and refresh and rate > 0.0 and refresh > 0.0):
+    """Refreshes of the slowest projector until every camera is ready again."""
+    cameras, lamps = (_figures_of(plan, kind) for kind in ("camera", "projector"))
+    rate = min(figures.frame_rate_hz or 0.0 for figures in cameras)
+    refresh = min(figures.frame_rate_hz or 0.0 for figures in lamps)
+    if not (rate > 0.0 and refresh > 0.0):
         return None
     planned = [one.exposure_s for one in plan.projectors if one.exposure_s is not None]
-    exposed = max(planned) if planned else 1e-3 * (rig.camera.figures.exposure_ms or 0)
+    exposed = (
+        max(planned) if planned else 1e-3 * max(f.exposure_ms or 0 for f in cameras)
+    )
     longest = max(1.0 / rate, exposed)
     refreshes = longest * refresh * (1.0 - _RELATIVE)
     return max(math.ceil(refreshes), 1) / refresh if math.isfinite(refreshes) else None
+
+
+def _figures_of(plan: RigPlan, kind: str) -> list[FiguresRecord]:
+    """The figures of the models that the plan's devices are of."""
+    models = plan.document.rig.models(kind)
+    taken = {device.model for device in getattr(plan, f"{kind}s")}
+    return [m.figures for m in models if m.name in taken] or [models[0].figures]
 
 
 def _total(cost: CostRecord, acquired: float | None, pixels: float) -> float | None:

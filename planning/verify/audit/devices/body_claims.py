@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from planning.model.bodies import Body
-from planning.model.planned import PlannedCamera
 from planning.model.requirements import Workspace
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
@@ -24,17 +23,22 @@ _ROUNDING = 1e-9
 def audit_bodies(case: AuditCase, findings: AuditFindings) -> None:
     """Check that each device's body is that of the rig, or of its own entry there."""
     plan, rig = case.plan, case.plan.document.rig
-    models = {"projector": rig.projector, "camera": rig.camera}
     by_name = {str(table.get("name")): table.get("body") for table in rig.existing}
-    bodies = [(f"rig.{kind}", kind, "", model.body) for kind, model in models.items()]
-    for device in (*plan.projectors, *plan.cameras):
-        kind = "camera" if isinstance(device, PlannedCamera) else "projector"
-        bodies.append((device.id, kind, device.existing, device.body))
+    kinds = {kind.name: kind for kind in case.kinds}
+    for kind in case.kinds:
+        for model in kind.models:
+            below = findings.at(f"rig.{kind.name}.body")
+            _audit_body(model.body, model.figures.body, below)
+    bodies = [
+        (device.id, kind.name, device.existing, device.model, device.body)
+        for kind in case.kinds
+        for device in kind.devices
+    ]
     for place, device in enumerate(plan.requirements.existing):
         key = f"requirements.existing.{place}"
-        bodies.append((key, device.kind, device.name, device.body))
-    for key, kind, name, body in bodies:
-        stated = by_name.get(name) or models[kind].figures.body
+        bodies.append((key, device.kind, device.name, device.model, device.body))
+    for key, kind, name, model, body in bodies:
+        stated = by_name.get(name) or kinds[kind].model_of(model).figures.body
         _audit_body(body, stated, findings.at(f"{key}.body"))
 
 

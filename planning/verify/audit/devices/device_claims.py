@@ -91,9 +91,14 @@ def _audit_last_ring(
 def _audit_model(
     kind: DeviceKind, record: ProjectorRecord | CameraRecord, findings: AuditFindings
 ) -> None:
+    names = [model.name for model in kind.models] if len(kind.models) > 1 else [""]
+    findings.holds(
+        record.model in names, "model", f"{record.model!r} is none of the rig's {names}"
+    )
+    model = kind.model_of(record.model)
     for name in _MODEL:
         if name in type(record).model_fields:
-            claimed, truth = getattr(record, name), getattr(kind.model, name)
+            claimed, truth = getattr(record, name), getattr(model, name)
             slack = 1e-9 * float(np.abs(np.array(claimed or 0.0)).max(initial=0.0))
             findings.same(name, claimed, truth, f"rig.{kind.name}.{name}", slack)
 

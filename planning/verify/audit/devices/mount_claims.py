@@ -50,7 +50,7 @@ def audit_mounts(case: AuditCase, findings: AuditFindings) -> None:
 def _audit_figures(
     kind: DeviceKind, mount: Mount | None, findings: AuditFindings
 ) -> None:
-    stated, whose = kind.model.figures.mount, f"rig.{kind.name}.figures.mount"
+    stated, whose = kind.models[0].figures.mount, f"rig.{kind.name}.figures.mount"
     if mount is None or stated is None:
         findings.holds(
             mount is None and stated is None,

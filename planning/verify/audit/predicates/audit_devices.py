@@ -281,26 +281,41 @@ def audit_cameras(plan: RigPlan) -> tuple[AuditCamera, ...]:
 
 
 def reference_projectors(plan: RigPlan) -> tuple[AuditProjector, ...]:
-    """Return the reference projectors: the plan's model at every reference pose."""
+    """Return the reference projectors: each pose with the optics of its model."""
     if not plan.projectors:
         return ()
     last = np.array([plan.requirements.workspace.reference_ring_radius])
-    device, surface = plan.projectors[0].device, plan.surface
-    poses = zip(surface.reference_projectors, surface.reference_rings, strict=True)
+    devices, surface = _optics(plan, "projector"), plan.surface
+    poses = zip(
+        surface.reference_projectors,
+        surface.reference_rings,
+        surface.models_of("projector"),
+        strict=True,
+    )
     return tuple(
-        AuditProjector(device, pose, ring, last, bodies_about(plan, "projector", pose))
-        for pose, ring in poses
+        AuditProjector(
+            devices[model], pose, ring, last, bodies_about(plan, "projector", pose)
+        )
+        for pose, ring, model in poses
     )
 
 
+def _optics(plan: RigPlan, kind: str) -> list[PinholeModel | ParallelModel]:
+    """Return the optics of each model of a kind."""
+    models, devices = plan.document.rig.models(kind), getattr(plan, f"{kind}s")
+    # Of one, the plan's own device: its model is audited against it.
+    return [m.optics for m in models] if len(models) > 1 else [devices[0].device]
+
+
 def reference_cameras(plan: RigPlan) -> tuple[AuditCamera, ...]:
-    """Return the reference cameras: the plan's model at every reference pose."""
+    """Return the reference cameras: each pose with the optics of its model."""
     if not plan.cameras:
         return ()
-    device = plan.cameras[0].device
+    devices, surface = _optics(plan, "camera"), plan.surface
+    poses = zip(surface.reference_cameras, surface.models_of("camera"), strict=True)
     return tuple(
-        AuditCamera(device, pose, bodies_about(plan, "camera", pose))
-        for pose in plan.surface.reference_cameras
+        AuditCamera(devices[model], pose, bodies_about(plan, "camera", pose))
+        for pose, model in poses
     )
 
 

@@ -43,7 +43,7 @@ class RenderedScene:
         middle = truth.mesh.centre
         self.lenses = [
             photometry.through_lens(
-                truth.camera_focus,
+                self._cameras[camera.id].focus,
                 float((middle - camera.centre) @ camera.axis),
                 camera.focal_px,
             )

@@ -7,8 +7,8 @@ import numpy as np
 from geometry.rays.rays import CHUNK, RayCaster, equal_parts
 from planning.verify.reconstruction.arrays import Array, Columns, Grey, Indices
 from planning.verify.reconstruction.calibration import ProjectorCalibration
+from planning.verify.reconstruction.defocus import Defocus
 from planning.verify.reconstruction.patterns.ring_patterns import RingsForCamera
-from planning.verify.reconstruction.scanner import Defocus
 
 from .lamp import Lamp
 from .view import RenderedView

@@ -123,11 +123,15 @@ def _writes(text: str) -> Callable[[BinaryIO], object]:
 def _readme(scanner: Scanner) -> str:
     cameras = [camera.id for camera in scanner.cameras]
     first, frames = scanner.projectors[0], scanner.frames(0)
-    lens, pupil = scanner.camera_focus, scanner.projector_focus
+    lens, pupil = [one.focus for one in scanner.cameras], scanner.projector_focus
+    sharp = sorted({f"{one.focus_m:g} m" for one in lens if one is not None})
     lenses = [
-        "Cameras are pinholes: the plan doesn't say how they are focused."
-        if lens is None
-        else f"Cameras are thin lenses, focused at {lens.focus_m:g} m.",
+        f"Cameras are thin lenses, focused at {' or '.join(sharp)}."
+        if sharp and None not in lens
+        else "Cameras are pinholes: the plan doesn't say how they are focused."
+        if not sharp
+        else f"Cameras are thin lenses, focused at {' or '.join(sharp)}, and pinholes "
+        f"where the plan doesn't say how they are focused.",
         "Projectors are pinholes: the plan doesn't say how they are focused."
         if pupil is None
         else f"Projectors are {_PINHOLES} pinholes over a pupil of "

@@ -26,7 +26,8 @@ from planning.verify.reconstruction.calibration import (
     CameraCalibration,
     ProjectorCalibration,
 )
-from planning.verify.reconstruction.scanner import Defocus, Scanner
+from planning.verify.reconstruction.defocus import Defocus
+from planning.verify.reconstruction.scanner import Scanner
 
 MATERIALS = "materials"
 # What the parameters of a scene are unless others are given.
@@ -103,7 +104,7 @@ def scene_text(
     if ambient > 0.0:
         parts.append(_tag("emitter", "constant", _value("rgb", "radiance", ambient)))
     parts += [
-        _camera(camera, window, scanner.camera_focus)
+        _camera(camera, window, camera.focus)
         for camera, window in zip(scanner.cameras, windows, strict=True)
     ]
     parts += _dark(scanner, None if shine is None else shine.projector)

@@ -1,0 +1,82 @@
+"""Existing devices in the world, and whether so many may stand."""
+
+from collections.abc import Mapping, Sequence
+
+from planning.model.bodies import Body, Existing
+from planning.model.device_poses import rounded_pose
+from planning.model.errors import InfeasibleLimitsError, RigError
+from planning.model.requirements import Requirements, Workspace
+
+from .existing_tables import ExistingTable
+from .models import Model
+
+
+def build_existing(
+    tables: Sequence[ExistingTable],
+    workspace: Workspace,
+    models: Mapping[str, Sequence[Model]],
+) -> tuple[Existing, ...]:
+    """Return the devices of `[[existing]]` in the world, as the plan will hold them.
+
+    `models` are the rig's of each kind.
+
+    Raises:
+        RigError: If one is of a model that the rig doesn't have.
+    """
+
+    def placed(table: ExistingTable) -> Existing:
+        model = _model_of(table, models[table.kind])
+        pose = rounded_pose(table.pose(workspace, model.device)).tolist()
+        rows = tuple(tuple(row) for row in pose)
+        body = Body.of(table.body) or model.body
+        return Existing(table.name, table.kind, rows, body, model=model.name)
+
+    return tuple(placed(table) for table in tables)
+
+
+def _model_of(table: ExistingTable, models: Sequence[Model]) -> Model:
+    """The model that an entry names, or the first."""
+    if table.model is None:
+        return models[0]
+    for model in models:
+        if table.model == model.table.name:
+            return model
+    known = ", ".join(repr(model.table.name) for model in models)
+    raise RigError(
+        f"existing {table.name!r}: model = {table.model!r} is none of the rig's "
+        f"{table.kind}s; name one of {known}"
+    )
+
+
+def check_existing(required: Requirements) -> None:
+    """Refuse more existing devices than are allowed, and two where one can stand.
+
+    Raises:
+        InfeasibleLimitsError: It names the limit, both numbers and what to do.
+    """
+    for kind, most in (
+        ("projector", required.max_projectors),
+        ("camera", required.max_cameras),
+    ):
+        n = len(required.existing_of(kind))
+        if most is not None and n > most:
+            raise InfeasibleLimitsError(
+                f"max_{kind}s = {most} is less than the {n} {kind}s of [[existing]], "
+                f"or --fixed, which stay; raise --max-{kind}s or take one out"
+            )
+        places: dict[tuple[float, ...], str] = {}
+        for device in required.existing_of(kind):
+            place = tuple(row[3] for row in device.world_from_device[:3])
+            if place in places:
+                raise InfeasibleLimitsError(
+                    f"existing {kind}s {places[place]!r} and {device.name!r} stand at "
+                    f"the same place; take one out or correct it"
+                )
+            places[place] = device.name
+        for model, count in required.stock_of(kind).items():
+            taken = sum(d.model == model for d in required.existing_of(kind))
+            if taken > count:
+                raise InfeasibleLimitsError(
+                    f"{taken} existing {kind}s are of {model!r}, of which count = "
+                    f"{count} says there are no more; raise it or take one out"
+                )
