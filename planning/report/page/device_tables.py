@@ -27,12 +27,14 @@ def _poses(plan: RigPlan) -> str:
     areas = {p.id: (p.lit_area_m2, None) for p in plan.document.projectors}
     areas |= {c.id: (c.seen_area_m2, c.sole_area_m2) for c in plan.document.cameras}
     rows: list[list[str]] = []
+    several = any(device.model for device in (*plan.projectors, *plan.cameras))
     for device, (*numbers, distance) in standing(plan):
         near, far = device.device.range_m
         covered, sole = areas[device.id]
         rows.append(
             [
                 device.id + (f" ({device.existing})" if device.existing else ""),
+                *([device.model] if several else []),
                 # Adding 0.0 leaves no -0.0.
                 *(f"{number:.1f}" for number in np.round(numbers, 1) + 0.0),
                 f"{distance:.1f}",
@@ -42,7 +44,8 @@ def _poses(plan: RigPlan) -> str:
                 "" if sole is None else area_words(sole),
             ]
         )
-    head = ["device", "x [mm]", "y [mm]", "z [mm]", "pan [deg]", "tilt [deg]"]
+    head = ["device", *(["model"] if several else []), "x [mm]", "y [mm]", "z [mm]"]
+    head += ["pan [deg]", "tilt [deg]"]
     head += ["roll [deg]", "aim azimuth [deg]", "aim elevation [deg]"]
     head += ["standoff to centre [mm]", "sharp [mm]", "pixels"]
     head += ["target lit or measured", "by it alone"]

@@ -11,8 +11,14 @@ from typing import Any
 
 from planning.rig.rig_tables import RigTable
 
+from .laying import DEVICES
 from .preset_files import names_in, preset_names
 
+_TABLES = {
+    "camera": "CameraTable",
+    "projector": "ProjectorTable",
+    "parallel_projector": "ParallelTable",
+}
 # What a file lays over a base or a device needs no key of its own.
 _LAID = (
     *("CameraTable", "ProjectorTable", "ParallelTable", "FocusTable"),
@@ -38,9 +44,10 @@ _NAMED = {
     "base": "the preset that this file is laid over (`plan rigs`)",
     "from": "the calibration that keys beside it are laid over (`plan rigs`)",
     "sensor": "the sensor that keys beside it are laid over (`plan rigs`)",
-    "camera": "the cameras: a name of `plan rigs devices`, or a table",
-    "projector": "the projectors, of diverging light: a name, or a table",
-    "parallel_projector": "the projectors of parallel light",
+    "camera": "the cameras: a name of `plan rigs devices`, a table, or a list of either",
+    "projector": "the projectors, of diverging light: a name, a table, or a list",
+    "parallel_projector": "the projectors of parallel light: a table or a list",
+    "model": "of an existing device: the name of one of a list of models",
     "focus": "the lens is set to one distance; what blurs little is sharp",
     "f_number": "focal length over the width of the aperture",
     "body": "the housing, a box that moves with the device",
@@ -87,9 +94,16 @@ def rig_schema(page: str) -> str:
             text = _NAMED.get(key) or found
             unit = _UNITS.get(key.rpartition("_")[2], "") if "_" in key else ""
             entry["description"] = (f"{text} [{unit}]" if unit else text).strip()
-    for role in ("projector", "camera"):
-        entry = schema["properties"][role]
-        entry["anyOf"] = [{"type": "string"}, {"$ref": entry.pop("$ref")}]
+    for role in DEVICES:
+        entry, one = schema["properties"][role], {"$ref": f"#/$defs/{_TABLES[role]}"}
+        entry.pop("$ref", None)
+        named = [] if role == "parallel_projector" else [{"type": "string"}]
+        one_of = [*named, one]
+        entry["anyOf"] = [
+            *one_of,
+            {"type": "array", "minItems": 1, "items": {"anyOf": one_of}},
+        ]
+        del schema["properties"][f"more_{role}s"]
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
     return json.dumps({**head, **schema, "title": "ringrig rig file"}, indent=1) + "\n"
 
