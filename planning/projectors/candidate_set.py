@@ -109,8 +109,14 @@ class CandidateSet:
             max_count=required.max_projectors,
             n_existing=self.n_existing,
             regions=RegionFloors.of(self.scene, self.samples),
-            stock=DeviceStock.of(self.projectors, required.stock_of("projector")),
+            stock=self.stock,
         )
+
+    @cached_property
+    def stock(self) -> DeviceStock | None:
+        """How many there are of each pose's model; None: any number."""
+        counts = self.scene.requirements.stock_of("projector")
+        return DeviceStock.of(self.projectors, counts)
 
     def extended(self, more: tuple[PlannedProjector, ...]) -> "CandidateSet":
         """Return these poses and more."""

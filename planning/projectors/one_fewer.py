@@ -135,7 +135,7 @@ def _most_lit(
     for spare in spares if regions.share else (0.0,):
         sought = Quotas.of(regions, reached, share, spare=spare)
         best = solve_max_coverage(
-            cover_problem(poses.lit, sought, poses.n_existing),
+            cover_problem(poses.lit, sought, poses.n_existing, poses.stock),
             n_projectors,
             warm_start=start,
             seed=seed,
@@ -186,6 +186,8 @@ def _swapped(
             counts = of_number[:, ~lit] @ poses.lit[~lit].astype(np.float32)
             counts = counts.astype(np.int64) + quotas.regions.counts(lit)[:, None]
             missed, total = _missed(quotas, counts), counts.sum(axis=0)
+            if poses.stock is not None:
+                missed[poses.stock.left(rest)[poses.stock.kinds] <= 0] = np.inf
             into = int(np.lexsort((-total, missed))[0])
             swapped = np.unique(np.append(rest, into))
             swaps.append(((float(missed[into]), -int(total[into])), swapped))

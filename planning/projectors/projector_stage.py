@@ -120,5 +120,6 @@ def _with_widest_margin(candidates: CandidateSet, selection: Selection) -> Selec
         candidates.cover.aims,
         seed=scene.seed,
         n_existing=candidates.n_existing,
+        stock=candidates.stock,
     )
     return replace(selection, chosen=chosen)

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.planned import PlannedProjector
+from planning.proofs.device_stock import DeviceStock
 from planning.proofs.quotas import Quotas
 from planning.proofs.selection import cover_problem
 from planning.scene.placed_bodies import movable
@@ -73,6 +74,7 @@ def widest_selection(
     *,
     seed: int,
     n_existing: int = 0,
+    stock: DeviceStock | None = None,
 ) -> NDArray[np.int64]:
     """Return as many candidates as chosen, with the largest margin at the share found.
 
@@ -85,7 +87,7 @@ def widest_selection(
     step = 2.0 * _STEP_RAD
     while high - low > _STEP_RAD:
         level = min(0.5 * (low + high), low + step)
-        problem = cover_problem(margin >= level, quotas, n_existing)
+        problem = cover_problem(margin >= level, quotas, n_existing, stock)
         selected = solve_max_coverage(
             problem, len(chosen), warm_start=best, seed=seed, budget=_BUDGET
         ).selected
@@ -106,21 +108,22 @@ def widest_between(
 ) -> tuple[PlannedProjector, ...]:
     """Return as many projectors at poses of larger margin, where there are any."""
     n_existing = len(projectors) - len(movable(projectors))
-    margin = margins(projectors)
+    margin, counts = margins(projectors), scene.requirements.stock_of("projector")
     source = CandidateSource(scene, one_of_each(reversed(projectors)))
     for scale in _SCALES:
         between = source.around(projectors, n_lattice, scale)
         if not between:
             break
         margin = np.concatenate([margin, margins(between)], axis=1)
+        candidates = (*projectors, *between)
         chosen = widest_selection(
             margin,
             np.arange(len(projectors)),
             quotas,
             seed=scene.seed,
             n_existing=n_existing,
+            stock=DeviceStock.of(candidates, counts),
         )
-        candidates = (*projectors, *between)
         projectors = tuple(candidates[i] for i in chosen)
         margin = margin[:, chosen]
     return projectors

@@ -78,7 +78,9 @@ def test_existing_devices_say_which_model_they_are():
     ]
     one, other = required(mixed(NARROW, WIDE, existing=rows)).existing
     assert (one.model, other.model) == ("wide", "narrow")
-    with pytest.raises(RigError, match=r"'tele' is none of the rig's cameras; .*'wide'"):
+    with pytest.raises(
+        RigError, match=r"'tele' is none of the rig's cameras; .*'wide'"
+    ):
         required(mixed(NARROW, WIDE, existing=[rows[0] | {"model": "tele"}]))
     rows[1] |= {"model": "wide"}
     with pytest.raises(InfeasibleLimitsError, match=r"2 existing .* count = 1"):
@@ -94,7 +96,10 @@ REFUSED = {
     "no such device": ([NARROW, "basler/none + 8mm"], r"camera\[1\]\] device"),
     "no name": ([NARROW, {"count": 2}], r"camera\[1\].*missing"),
     "a count of none": ([NARROW, WIDE | {"count": 0}], r"camera\[1\].count` = 0"),
-    "a key of none": ([NARROW, WIDE | {"cuont": 2}], r"camera\[1\].*did you mean count"),
+    "a key of none": (
+        [NARROW, WIDE | {"cuont": 2}],
+        r"camera\[1\].*did you mean count",
+    ),
 }
 
 

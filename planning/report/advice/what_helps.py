@@ -5,6 +5,7 @@ from contextlib import AbstractContextManager
 from planning.model.document.certificates import Certificate, Certificates
 from planning.model.document.coverage_records import Coverage
 from planning.model.progress import Stopwatch
+from planning.model.requirements import Requirements
 from planning.report.claims import Claims
 from planning.report.judged import Devices
 from planning.report.partial_plan import PartialPlan
@@ -49,13 +50,13 @@ def with_fewer_needed(
     """Return the certificates with what would let as many as are allowed be enough."""
     required = partial.scene.requirements
     projectors, cameras = proofs.projectors, proofs.cameras
-    if _too_few(projectors, required.max_projectors):
+    if _too_few(projectors, required, "projector"):
         with _timed(clock):
             field = wider_field(partial.scene, partial.stage, required.max_projectors)
         if field is not None:
             needed = projectors.needed.changed(wider_field=field)
             proofs = proofs.changed(projectors=projectors.changed(needed=needed))
-    if _too_few(cameras, required.max_cameras):
+    if _too_few(cameras, required, "camera"):
         with _timed(clock):
             scene, count = partial.scene.among(partial.projectors), required.max_cameras
             changes = for_so_many(
@@ -80,8 +81,11 @@ def falls_short(area_m2: float, whole_m2: float, share: float) -> bool:
     return area_m2 < share * whole_m2
 
 
-def _too_few(proof: Certificate, allowed: int | None) -> bool:
-    return allowed is not None and proof.needed.count > allowed
+def _too_few(proof: Certificate, required: Requirements, kind: str) -> bool:
+    """Whether more are needed than are allowed; of a stock it is more that helps."""
+    allowed = getattr(required, f"max_{kind}s")
+    too_few = allowed is not None and proof.needed.count > allowed
+    return too_few and not required.stock_of(kind)
 
 
 def _timed(clock: Stopwatch) -> AbstractContextManager[None]:
