@@ -79,7 +79,7 @@ def test_existing_devices_say_which_model_they_are():
     one, other = required(mixed(NARROW, WIDE, existing=rows)).existing
     assert (one.model, other.model) == ("wide", "narrow")
     with pytest.raises(
-        RigError, match=r"'tele' is none of the rig's cameras; .*'wide'"
+        RigError, match=r"'tele' is none of the rig's cameras"
     ):
         required(mixed(NARROW, WIDE, existing=[rows[0] | {"model": "tele"}]))
     rows[1] |= {"model": "wide"}
@@ -98,7 +98,7 @@ REFUSED = {
     "a count of none": ([NARROW, WIDE | {"count": 0}], r"camera\[1\].count` = 0"),
     "a key of none": (
         [NARROW, WIDE | {"cuont": 2}],
-        r"camera\[1\].*did you mean count",
+        r"camera\[1\].*mean count",
     ),
 }
 

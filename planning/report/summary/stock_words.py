@@ -17,7 +17,7 @@ def used_up(document: PlanDocument, kind: str) -> str:
 
 
 def models_line(document: PlanDocument) -> str:
-    """Return which device is of which of several models; empty where none has others."""
+    """Return which device is of which of several models; empty of one."""
     of_models: dict[str, list[str]] = {}
     for record in (*document.projectors, *document.cameras):
         if record.model:

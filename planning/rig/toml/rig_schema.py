@@ -44,7 +44,7 @@ _NAMED = {
     "base": "the preset that this file is laid over (`plan rigs`)",
     "from": "the calibration that keys beside it are laid over (`plan rigs`)",
     "sensor": "the sensor that keys beside it are laid over (`plan rigs`)",
-    "camera": "the cameras: a name of `plan rigs devices`, a table, or a list of either",
+    "camera": "the cameras: a name of `plan rigs devices`, a table, or a list",
     "projector": "the projectors, of diverging light: a name, a table, or a list",
     "parallel_projector": "the projectors of parallel light: a table or a list",
     "model": "of an existing device: the name of one of a list of models",

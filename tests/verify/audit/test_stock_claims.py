@@ -1,4 +1,4 @@
-"""A plan of several models of cameras: what is claimed of them is held against the rig."""
+"""A plan of several models of cameras: their claims are held against the rig."""
 
 import copy
 from dataclasses import replace
