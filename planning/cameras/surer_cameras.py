@@ -77,7 +77,9 @@ def surer_cameras(
     scene = scene.among(projectors)
     target = scene.target_samples(DRAWS.surer)
     samples = lit_samples(scene, projectors, target)
-    near = with_clearance(scene, _offer(scene, stage).nearest(n_candidates))
+    models = one_of_each(stage.cover.candidates.cameras)
+    offer = ModelCandidates.over_scene(scene, models)
+    near = with_clearance(scene, offer.nearest(n_candidates * len(models)))
     candidates = stage.cover.candidates.joined((*near, *cameras))
     views = candidates.on(samples.target)
     limits = scene.requirements.triangulation
@@ -126,11 +128,6 @@ def surer_cameras(
         min(aim.most or np.inf, scene.requirements.max_cameras or np.inf),
     )
     return tuple(candidates.cameras[c] for c in search.run(start))
-
-
-def _offer(scene: Scene, stage: CameraStage) -> ModelCandidates[PlannedCamera]:
-    """What gives candidates of every model that the stage had."""
-    return ModelCandidates.over_scene(scene, one_of_each(stage.reference))
 
 
 @dataclass(eq=False)

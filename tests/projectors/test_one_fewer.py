@@ -116,6 +116,7 @@ class Poses:
 
     lit: np.ndarray
     n_existing: int = 1
+    stock: None = None
 
 
 @pytest.mark.parametrize("seed", range(5))

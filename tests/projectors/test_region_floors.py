@@ -76,7 +76,7 @@ def test_projectors_beyond_the_fewest_stand_where_they_are_allowed(
     scene, stage, _ = planned((*BIG, *small), 0.0, **asked)
     monkeypatch.setattr(stages, "prove_fewest", lambda *_: stage)
     request = SimpleNamespace(prove=False, least_projectors=least)
-    ready = SimpleNamespace(request=request, scene=scene, template=None)
+    ready = SimpleNamespace(request=request, scene=scene, templates=())
     found = stages.bounded_projectors(ready, stage, Stopwatch())
     proof = found.certificate
     assert len(found.projectors) == proof.count == proof.needed.count == count

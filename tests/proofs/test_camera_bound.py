@@ -227,7 +227,7 @@ def test_seen_as_a_point_each_limit_forbids_what_misses_it_by_a_fifth(limit):
     towards /= distance[:, None]
     every, psi = np.arange(len(distance)), np.full(len(distance), 0.0017)
     kept = [
-        MeasurableCells(rows, s.requirements, device).admits(
+        MeasurableCells(rows, s.requirements, (device,)).admits(
             every, towards, distance - 1e-3, psi
         )
         for s in (scene, stricter)
@@ -236,6 +236,27 @@ def test_seen_as_a_point_each_limit_forbids_what_misses_it_by_a_fifth(limit):
     assert np.all(kept[0][eye])
     assert not np.any(kept[1] & ~eye)
     assert 0 < np.count_nonzero(eye) < np.count_nonzero(_facing(towards, samples))
+
+
+def test_of_several_models_what_any_may_measure_is_admitted():
+    """No more than each admits alone, and no less."""
+    one = LENSES["plain"]
+    matrix = one.camera_matrix.copy()
+    matrix[[0, 1], [0, 1]] *= 0.4
+    other = PinholeModel(matrix, one.resolution, one.range_m)
+    loose = FREE | {"min_ring_pitch_px": TIGHT["min_ring_pitch_px"]}
+    scene, _, rows = shown(sphere(0.1, subdivisions=3), one, loose)
+    towards = np.array([0.5, -0.8, 0.55]) - rows.target.samples.points
+    distance = np.linalg.norm(towards, axis=1)
+    every, psi = np.arange(len(distance)), np.full(len(distance), 0.05)
+    by_one, by_other, by_both = (
+        MeasurableCells(rows, scene.requirements, devices).admits(
+            every, towards / distance[:, None], distance - 0.02, psi
+        )
+        for devices in ((one,), (other,), (other, one))
+    )
+    assert np.any(by_one & ~by_other)
+    assert np.array_equal(by_both, by_one | by_other)
 
 
 def test_over_a_cone_the_largest_cosine_and_the_least_sine_to_a_line():
@@ -308,7 +329,7 @@ def test_what_any_place_and_aim_measures_is_admitted(limit, value, off, name):
     towards = _turned_by(normals, np.radians(rng.uniform(0, 85, n)), rng)
     psi, far = rng.uniform(0.0, 0.35, n), rng.uniform(0.95, 1.4, n)
     nearest = far - rng.uniform(0.0, 0.2, n)
-    cells = MeasurableCells(rows, required, device)
+    cells = MeasurableCells(rows, required, (device,))
     admitted = cells.admits(np.arange(n), towards, nearest, psi)
     # Places in each cell, and pixels in which the sample appears from there.
     lean = psi[:, None] * rng.choice([0.0, 0.5, 1.0], (n, tries))

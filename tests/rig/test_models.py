@@ -78,9 +78,7 @@ def test_existing_devices_say_which_model_they_are():
     ]
     one, other = required(mixed(NARROW, WIDE, existing=rows)).existing
     assert (one.model, other.model) == ("wide", "narrow")
-    with pytest.raises(
-        RigError, match=r"'tele' is none of the rig's cameras"
-    ):
+    with pytest.raises(RigError, match=r"'tele' is none of the rig's cameras"):
         required(mixed(NARROW, WIDE, existing=[rows[0] | {"model": "tele"}]))
     rows[1] |= {"model": "wide"}
     with pytest.raises(InfeasibleLimitsError, match=r"2 existing .* count = 1"):

@@ -67,8 +67,9 @@ class ModelCandidates(Generic[_D]):
         return self._joined(lambda one: one.towards(directions))
 
     def nearest(self, n: int) -> tuple[_D, ...]:
-        """Return about n candidates of each model, as near as the shell allows."""
-        return self._joined(lambda one: one.nearest(n))
+        """Return about n candidates, as many of each model, as near as they may be."""
+        each = -(-n // len(self.of_models))
+        return self._joined(lambda one: one.nearest(each))
 
     def around(
         self,
