@@ -30,6 +30,7 @@ from .rig_devices import (
     device_document,
     device_notes,
     drawn_edges,
+    edge_notes,
     light_budget,
     parallel_device,
     pinhole_device,
@@ -176,7 +177,9 @@ class Rig:
         """Return what a user should know of limits and devices, a sentence each."""
         lit = device_notes(self.projector_key, self._projector_table)
         seen = device_notes("camera", self.table.camera)
-        return (*limit_notes(self.table.limits), *lit, *seen)
+        drawn = drawn_edges(self._projector_table, self._projector)
+        edges = edge_notes(drawn, self._projector, self._camera, self.standoff_m)
+        return (*limit_notes(self.table.limits), *lit, *seen, *edges)
 
     def requirements(
         self,

@@ -16,7 +16,7 @@ from pydantic_core import ErrorDetails
 from geometry.files.file_content import file_content
 from planning.model.errors import RigError
 from planning.model.files import reading
-from planning.model.table_types import fault_words
+from planning.model.table_types import fault_words, told_once
 from planning.rig.rig_tables import RigTable
 
 from .laying import lay_over
@@ -44,7 +44,7 @@ def read_rig(source: str | Path | Mapping[str, Any]) -> RigTable:
     try:
         table = RigTable.model_validate(tables)
     except ValidationError as error:
-        entries = error.errors(include_url=False)
+        entries = told_once(error.errors(include_url=False))
         faults += [_fault(e) for e in entries if not _follows(e, named.broken)]
     if table is None or faults:
         raise RigError("\n".join(f"{where}: {fault}" for fault in faults))
