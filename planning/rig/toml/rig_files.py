@@ -87,7 +87,13 @@ def _read_file(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(content.decode())
     except ValueError as error:
-        raise RigError(f"{path}: not TOML ({error}); correct that line") from None
+        remedy = "correct that line"
+        if "overwrite" in str(error):
+            remedy = (
+                "a key stands there twice; with tables of its own a device is "
+                'named within: [projector] device = "NAME"'
+            )
+        raise RigError(f"{path}: not TOML ({error}); {remedy}") from None
 
 
 def _fault(entry: ErrorDetails) -> str:
