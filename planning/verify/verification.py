@@ -229,12 +229,11 @@ def _reconstruct(
         samples, case.samples.weights, case.actual.measured_by, possible
     )
     compared = compare(believed, prediction, pixels.everything, pixels.accuracy)
-    physics = how["physics"]
-    bounced = interreflection(
-        believed,
-        pixels.merged,
-        albedo=ALBEDO if physics is None else physics.surface.albedo,
-    )
+    physics, stated = how["physics"], believed.light
+    albedo = ALBEDO if stated is None else stated.albedo[1]
+    if physics is not None:
+        albedo = physics.surface.albedo
+    bounced = interreflection(believed, pixels.merged, albedo=albedo)
     return replace(pixels, comparison=compared, interreflection=bounced)
 
 
