@@ -16,7 +16,7 @@ from embreex.rtcore_scene import EmbreeScene
 from geometry.arrays import Array, Ints, Mask, Single
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.topology import numbered
-from geometry.parallel import mapped
+from geometry.parallel import mapped, n_threads
 
 # Rays in one call of embree: their arrays stay in the second-level cache.
 CHUNK = 1 << 14
@@ -39,7 +39,8 @@ class RayCaster:
             vertex of a face lies within it, and it is in [1, 2).
     """
 
-    def __init__(self, mesh: TriangleMesh, *, threads: int = 2) -> None:
+    def __init__(self, mesh: TriangleMesh, *, threads: int | None = None) -> None:
+        threads = n_threads() if threads is None else threads
         if threads < 1:
             raise ValueError(f"threads must be at least 1, got {threads}")
         self.mesh = mesh

@@ -44,7 +44,7 @@ class Visibility:
         slack: Height in [m] above a sample's face at which its ray ends.
     """
 
-    def __init__(self, mesh: TriangleMesh, *, threads: int = 2) -> None:
+    def __init__(self, mesh: TriangleMesh, *, threads: int | None = None) -> None:
         self.caster = RayCaster(mesh, threads=threads)
         away = float(np.abs(mesh.bounds).max()) * self.caster.scale
         local = max(

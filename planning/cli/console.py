@@ -59,6 +59,10 @@ class Finite(click.FloatRange):
         ctx: click.Context | None,
     ) -> Any:  # noqa: ANN401
         """Return the number, or fail as usage."""
+        try:
+            value = float(value)
+        except ValueError:
+            self.fail(f"{value!r} isn't a number.", param, ctx)
         number = super().convert(value, param, ctx)
         if not math.isfinite(number):
             self.fail(f"{value} isn't a finite number.", param, ctx)

@@ -6,6 +6,7 @@ Heavy packages are imported inside the commands, so that `plan --help` stays qui
 import os
 import sys
 import time
+from collections.abc import Iterator
 from typing import NoReturn
 
 import click
@@ -143,9 +144,20 @@ def main() -> None:
         error.show()
         sys.exit(error.exit_code)
     except click.ClickException as error:
-        stop(f"{error.format_message()} (see `plan --help`)", error.exit_code)
+        told = " ".join(["plan", *_named(sys.argv[1:]), "--help"])
+        stop(f"{error.format_message()} (see `{told}`)", error.exit_code)
     except (click.Abort, KeyboardInterrupt):
         stop("interrupted", 130)
+
+
+def _named(words: list[str]) -> Iterator[str]:
+    """Yield the commands that a command line begins with."""
+    command: click.Command = commands
+    for word in words:
+        if not isinstance(command, click.Group) or word not in command.commands:
+            return
+        yield word
+        command = command.commands[word]
 
 
 def _quit(number: int, frame: object) -> NoReturn:

@@ -82,7 +82,7 @@ def run_experiment(
     *,
     photometry: Photometry = DARK,
     seed: int = 0,
-    threads: int = 2,
+    threads: int | None = None,
     tolerance_m: float | None = None,
     progress: Progress | None = None,
 ) -> Outcome:
@@ -143,7 +143,7 @@ def double_density(
     second: Scanner | None = None,
     *,
     seed: int = 0,
-    threads: int = 2,
+    threads: int | None = None,
 ) -> MeasuredErrors:
     """Measure an experiment's object again, with rings between those of before.
 

@@ -61,19 +61,19 @@ class HandedPlan(RigPlan):
         mesh: TriangleMesh | None = None,
         *,
         seed: int | None = None,
-        threads: int = 2,
+        threads: int | None = None,
     ) -> Verification:
         """Recompute every claim and check from pixels, as `verify_plan` does."""
         return verify_plan(self, mesh, seed=seed, threads=threads)
 
     def reconstruct(
-        self, *, seed: int | None = None, threads: int = 2
+        self, *, seed: int | None = None, threads: int | None = None
     ) -> Reconstruction:
         """Render what cameras would see of it, decode and triangulate that.
 
         Args:
             seed: Of noise; None: the plan's.
-            threads: Worker threads.
+            threads: Worker threads. None: all cores.
         """
         seed = self.document.seed if seed is None else seed
         return reconstruct(Scanner.of(self), seed=seed, threads=threads)

@@ -1,6 +1,6 @@
 """What tables that people write are made of: strict values in stated ranges."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -137,6 +137,34 @@ def read_pose(rows: list[list[float]], key: str) -> Array:
     return pose
 
 
+def told_once(faults: Sequence[ErrorDetails]) -> list[ErrorDetails]:
+    """Return faults without those of a value's other types, where it may have several.
+
+    Pydantic tells each type's: of 1.5 where a share or a list of shares may stand, that
+    it is too large, and that it is no list. The first stays where it is of none.
+    """
+    return [
+        fault
+        for k, fault in enumerate(faults)
+        if not fault["type"].endswith("_type")
+        or not any(
+            _place(other)[: len(_place(fault))] == _place(fault)
+            and (i < k or not other["type"].endswith("_type") or _within(other, fault))
+            for i, other in enumerate(faults)
+            if i != k
+        )
+    ]
+
+
+def _within(inner: ErrorDetails, outer: ErrorDetails) -> bool:
+    return len(_place(inner)) > len(_place(outer))
+
+
+def _place(fault: ErrorDetails) -> tuple[int | str, ...]:
+    """Where a fault is; which type a value was read as is a word of pydantic's own."""
+    return tuple(k for k in fault["loc"] if isinstance(k, int) or k.isidentifier())
+
+
 def fault_words(fault: ErrorDetails, *, unknown: str, remedy: str) -> str:
     """Return a fault of a file in words: where, what was written, the rule, the remedy.
 
@@ -146,16 +174,14 @@ def fault_words(fault: ErrorDetails, *, unknown: str, remedy: str) -> str:
         remedy: What to do about a value that breaks a rule.
     """
     where = "".join(
-        f"[{key}]" if isinstance(key, int) else f".{key}"
-        for key in fault["loc"]
-        # Which of several types a value was read as is a word of pydantic's own.
-        if isinstance(key, int) or key.isidentifier()
+        f"[{key}]" if isinstance(key, int) else f".{key}" for key in _place(fault)
     ).removeprefix(".")
     if fault["type"] == "missing":
         return f"`{where}` is missing; write it"
     if fault["type"] == "extra_forbidden":
         return f"`{where}` is not a known key; {unknown}"
     rule = fault["msg"].removeprefix("Value error, ").removeprefix("Input ")
+    rule = rule.replace(" after validation", "")
     if fault["type"] == "value_error":
         return f"[{where}] {rule}" if where else rule
     value = repr(fault["input"])

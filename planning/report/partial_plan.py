@@ -1,8 +1,9 @@
 """A plan in the making: what was ordered, and the stages as far as they came."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from geometry.mesh.mesh import TriangleMesh
+from geometry.parallel import n_threads
 from geometry.regions.regions import DominantRegions
 from planning.cameras.proved_cameras import CameraStage
 from planning.model.document.certificates import CamerasBy
@@ -39,7 +40,7 @@ class PlanRequest:
     rig: Rig
     wishes: Wishes
     seed: int = 0
-    threads: int = 2
+    threads: int = field(default_factory=n_threads)
     command: tuple[str, ...] = ()
     interest: Interest | None = None
     prove: bool = False

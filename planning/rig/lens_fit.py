@@ -294,8 +294,8 @@ def optics_notes(fits: Sequence[LensFit]) -> Iterator[str]:
     for fit in fits:
         if fit.share < _LEAST_SHARE:
             yield (
-                f"the object fills {percent(fit.share)} of the {fit.role}'s image: "
-                f"{fit.advice()}"
+                f"the object fills {percent(fit.share)} of the {fit.role}'s image, and "
+                f"a longer lens would use more of it: {fit.advice()}"
             )
 
 

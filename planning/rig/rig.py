@@ -8,6 +8,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 from pathlib import Path
 from typing import Any, Literal
 
@@ -27,7 +28,13 @@ from .lens_fit import LensFit, unsharp
 from .models import Model, models_of, most_of, stock_of
 from .object_size import ObjectSize
 from .obstacle_tables import obstacles_of
-from .rig_devices import device_document, device_notes, drawn_edges, light_budget
+from .rig_devices import (
+    device_document,
+    device_notes,
+    drawn_edges,
+    edge_notes,
+    light_budget,
+)
 from .rig_requirements import build_requirements, build_workspace, limit_notes
 from .rig_tables import MountingTable, ParallelTable, PinholeTable, RigTable, RingsTable
 from .toml.rig_files import changed, read_rig, rig_folder
@@ -190,8 +197,11 @@ class Rig:
 
     def notes(self) -> tuple[str, ...]:
         """Return what a user should know of limits and devices, a sentence each."""
-        models = (*self.projector_models, *self.camera_models)
-        notes = [note for m in models for note in device_notes(m.role, m.table)]
+        lamps, eyes = self.projector_models, self.camera_models
+        notes = [n for m in (*lamps, *eyes) for n in device_notes(m.role, m.table)]
+        for lamp, eye in product(lamps, eyes):
+            drawn = drawn_edges(lamp.table, lamp.device)
+            notes += edge_notes(drawn, lamp.device, _pinhole(eye), self.standoff_m)
         return (*limit_notes(self.table.limits), *notes)
 
     def requirements(

@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from planning.model.bodies import BodyTable, MountTable
 from planning.model.calibration_errors import (
+    MOST_FOCAL,
     PERFECT,
     CalibrationErrors,
     Mounting,
@@ -42,6 +43,7 @@ Resolution = Annotated[
     list[Annotated[int, Field(ge=2, le=MOST_PIXELS)]],
     Field(min_length=2, max_length=2),
 ]
+FocalPercent = Annotated[float, Field(ge=0.0, le=1e2 * MOST_FOCAL)]
 Rate = Annotated[float, Field(ge=1e-3, le=1e6)]
 Five = Annotated[list[float], Field(min_length=5, max_length=5)]
 
@@ -211,7 +213,7 @@ class CalibrationTable(SourcedTable):
     description: str = ""
     angle_deg: Annotated[float, Field(ge=0.0, le=5.0)] = 0.0
     position_mm: Annotated[float, Field(ge=0.0)] = 0.0
-    focal_percent: Annotated[float, Field(ge=0.0, le=20.0)] = 0.0
+    focal_percent: FocalPercent = 0.0
     principal_px: Annotated[float, Field(ge=0.0)] = 0.0
 
     def errors(self) -> CalibrationErrors | None:
@@ -230,7 +232,7 @@ class MountingTable(Table):
 
     position_mm: Annotated[float, Field(ge=0.0)] = 0.0
     angle_deg: Annotated[float, Field(ge=0.0, le=45.0)] = 0.0
-    focal_percent: Annotated[float, Field(ge=0.0, le=20.0)] = 0.0
+    focal_percent: FocalPercent = 0.0
 
     def bounds(self) -> Mounting:
         """Return them in metres, radians and shares."""

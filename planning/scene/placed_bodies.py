@@ -47,7 +47,7 @@ class Obstruction:
     name: str
     mesh: TriangleMesh
     contact_m: float
-    threads: int = 2
+    threads: int | None = None
 
     @classmethod
     def about(

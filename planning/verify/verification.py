@@ -8,6 +8,7 @@ import numpy as np
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples, sample_surface
+from geometry.parallel import n_threads
 from geometry.rays.proximity import closest_points
 from planning.model.plan import RigPlan
 from planning.model.words import count_words
@@ -107,7 +108,7 @@ def verify_plan(
     physics: Physics | None = None,
     photometry: Photometry | None = None,
     seed: int | None = None,
-    threads: int = 2,
+    threads: int | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Verification:
     """Recompute every claim of a plan, then measure its object through pixels.
@@ -124,7 +125,7 @@ def verify_plan(
             every limit that isn't kept is a failure.
         photometry: Light and sensor; None: as the plan's check assumes.
         seed: Of the audit's samples and the pixel noise; the plan's own by default.
-        threads: Worker threads; the result doesn't depend on them.
+        threads: Worker threads; no result depends on them. None: all cores.
         progress: Receives a line when a stage begins.
 
     Raises:
@@ -135,6 +136,7 @@ def verify_plan(
         if progress is not None:
             progress(line)
 
+    threads = threads or n_threads()
     seed = plan.document.seed if seed is None else seed
     say("audit: recomputing every claim on fresh samples")
     audit = audit_plan(plan, seed=seed, threads=threads)
@@ -227,12 +229,11 @@ def _reconstruct(
         samples, case.samples.weights, case.actual.measured_by, possible
     )
     compared = compare(believed, prediction, pixels.everything, pixels.accuracy)
-    physics = how["physics"]
-    bounced = interreflection(
-        believed,
-        pixels.merged,
-        albedo=ALBEDO if physics is None else physics.surface.albedo,
-    )
+    physics, stated = how["physics"], believed.light
+    albedo = ALBEDO if stated is None else stated.albedo[1]
+    if physics is not None:
+        albedo = physics.surface.albedo
+    bounced = interreflection(believed, pixels.merged, albedo=albedo)
     return replace(pixels, comparison=compared, interreflection=bounced)
 
 

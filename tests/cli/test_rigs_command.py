@@ -101,8 +101,18 @@ def test_a_new_rig_asks_again_for_what_cannot_be(tmp_path, monkeypatch):
         ((), "give at least --object-mm"),
         (("--projector", "a/b", "--throw-ratio", "1"), "not both"),
         (
-            ("--object-mm", "900", "--distance-mm", "20", "--sensor-px", "64x48"),
+            (
+                *("--object-mm", "900", "--distance-mm", "200"),
+                *("--throw-ratio", "1", "--sensor-px", "64x48"),
+            ),
             "no usual",
+        ),
+        (("--object-mm", "150", "--distance-mm", "300"), "focused from 912 to 9124 mm"),
+        (("--object-mm", "15cm"), "isn't a number"),
+        (("--pixel-um", "9"), "--pixel-um goes with --sensor-px"),
+        (
+            ("--camera", "basler/acA2440-75um + 16mm", "--focal-mm", "25"),
+            "leave --focal-mm out",
         ),
         (("--projector", "a/b"), "no projector 'a/b'"),
     ],
@@ -113,6 +123,28 @@ def test_a_new_rig_of_nothing_is_refused(tmp_path, words, told):
     # Click's own page stands before what is wrong with the usage.
     assert told in error.splitlines()[-1]
     assert not list(tmp_path.iterdir())
+
+
+def test_a_new_rig_says_what_binds_its_distance(tmp_path):
+    words = ("--object-mm", "232", "--projector", "benq/sx914")
+    told = plan("rigs", "new", "-o", str(tmp_path / "a.toml"), *words)[1]
+    assert "the least at which the projector can be focused" in told
+    words = ("--object-mm", "232", "--throw-ratio", "1.5")
+    told = plan("rigs", "new", "-o", str(tmp_path / "b.toml"), *words)[1]
+    assert "the least at which one image of the projector holds the object" in told
+
+
+def test_no_lens_is_chosen_whose_pixels_lose_the_edges(tmp_path):
+    # At 320 mm a drawn edge is 0.26 mm wide and more, 6 pixels of a 25 mm lens.
+    words = ("--object-mm", "60", "--projector", "ti/dlplcr4710")
+    words += ("--sensor-px", "2448x2048")
+    told = plan("rigs", "new", "-o", str(tmp_path / "a.toml"), *words)[1]
+    assert "a 16 mm lens: the longest usual one" in told
+    assert "aren't found" not in told
+    path = str(tmp_path / "b.toml")
+    assert (
+        "aren't found" in plan("rigs", "new", "-o", path, *words, "--focal-mm", "25")[1]
+    )
 
 
 @pytest.fixture

@@ -134,7 +134,8 @@ class Pixels(click.ParamType):  # pyright: ignore[reportMissingTypeArgument]
     "--distance-mm",
     type=Positive(),
     metavar="D",
-    help="From device to surface [default: the least whose image holds the object].",
+    help="From device to surface [default: the least at which lenses focus and an "
+    "image holds the object].",
 )
 @debug_option
 def new(**options: Any) -> None:  # noqa: ANN401

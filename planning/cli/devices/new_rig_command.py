@@ -13,11 +13,11 @@ from planning.model.errors import InfeasibleLimitsError, InputError, RigError
 from planning.rig.object_size import ObjectSize
 from planning.rig.rig import Rig, load_rig
 from planning.rig.toml.catalogue import catalogue, split_camera
+from planning.rig.toml.fitting_optics import BALL
 from planning.rig.toml.new_rig import Answers, new_rig
 
 _OBJECT_MM = 250.0
 _PROJECTOR, _CAMERA = "panasonic/pt-lb386", "basler/acA2040-55um"
-_BALL = 0.6
 _Value = TypeVar("_Value")
 
 
@@ -34,6 +34,12 @@ def new_rig_command(options: Mapping[str, Any]) -> int:
         raise click.UsageError("give --projector or --throw-ratio, not both")
     if options["camera"] and options["sensor_px"]:
         raise click.UsageError("give --camera or --sensor-px, not both")
+    if options["focal_mm"] and "+" in (options["camera"] or ""):
+        raise click.UsageError("--camera names a lens; leave --focal-mm out")
+    for key, needed in _GOES_WITH.items():
+        if key in known and needed not in known:
+            words = (f"--{name.replace('_', '-')}" for name in (key, needed))
+            raise click.UsageError(" goes with ".join(words) + "; write both")
     asks = not known and _is_terminal()
     if not known and not asks:
         raise click.UsageError(
@@ -47,7 +53,7 @@ def new_rig_command(options: Mapping[str, Any]) -> int:
     except ValueError as error:
         if isinstance(error, InputError):
             raise
-        raise RigError(f"plan rigs new: {error}") from None
+        raise RigError(str(error).removeprefix("device: ")) from None
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
@@ -67,6 +73,11 @@ _KEYS = (
     *("object_mm", "projector", "throw_ratio", "projector_px", "offset_percent"),
     *("camera", "sensor_px", "pixel_um", "focal_mm", "distance_mm"),
 )
+_GOES_WITH = {
+    "projector_px": "throw_ratio",
+    "offset_percent": "throw_ratio",
+    "pixel_um": "sensor_px",
+}
 
 
 def _is_terminal() -> bool:
@@ -191,7 +202,7 @@ def _warnings(path: Path, object_mm: float) -> Iterator[str]:
     except InfeasibleLimitsError as error:
         yield f"it doesn't plan yet: {error}"
         return
-    size = ObjectSize.ball(1e-3 * _BALL * object_mm)
+    size = ObjectSize.ball(1e-3 * BALL * object_mm)
     models = (*rig.projector_models, *rig.camera_models)
     for fit in (rig.fit(model, size) for model in models):
         if not fit.device.holds_ball(fit.radius_m, fit.middle_m):

@@ -19,6 +19,7 @@ import numpy as np
 
 from geometry.arrays import Array, Mask
 from geometry.mesh.mesh import TriangleMesh
+from geometry.parallel import n_threads
 from planning.model.errors import InfeasibleLimitsError
 from planning.verify.reconstruction.check.merge import merge
 from planning.verify.reconstruction.check.overlaps import ring_pitch_px
@@ -139,7 +140,7 @@ def accept(
     *,
     seed: int,
     draws: int,
-    threads: int = 2,
+    threads: int | None = None,
     progress: Callable[[str], None] = lambda line: None,
 ) -> Acceptance:
     """Measure every artefact, as calibrated perfectly and in rigs drawn at random.
@@ -148,12 +149,13 @@ def accept(
         scanner: The plan's; its mesh says where the measuring volume is.
         seed: Of pixel noise and of the rigs.
         draws: How many rigs; none are drawn where the plan states no calibration.
-        threads: Worker threads; the result doesn't depend on them.
+        threads: Worker threads; no result depends on them. None: all cores.
         progress: Receives a line for each artefact.
 
     Raises:
         InfeasibleLimitsError: If too few points were measured of every artefact.
     """
+    threads = threads or n_threads()
     places: dict[str, Bar | Plate] = {
         **{f"bar {k}": one for k, one in enumerate(bars(scanner), 1)},
         **{f"plate {k}": one for k, one in enumerate(plates(scanner), 1)},

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from geometry.arrays import Array
-from geometry.poses import horizontal_axes, pan_tilt_roll, transform
-from planning.report.summary.device_lines import aim_angles, axis_name
+from geometry.poses import horizontal_axes, transform
+from planning.report.summary.device_lines import axis_name, standing_angles
 
 from .exported_rig import Content, ExportedDevice, ExportedRig
 
@@ -100,14 +100,13 @@ def _mount(device: ExportedDevice, rig: ExportedRig) -> list[str]:
     second, other = _second_point(device)
     mount, pose = device.world_from_mount, device.world_from_device
     out = [""] * 3 if mount is None else [f"{x:.5f}" for x in mount[:3, 2] + 0.0]
-    housing = np.degrees(pan_tilt_roll(pose[:3, :3], rig.up))
-    looks = aim_angles(device.planned, rig.up)[:2]
+    angles = standing_angles(device.planned, rig.up)
     ahead = pose[:3, 3] + device.reach_m * pose[:3, 2]
     return [
         *(device.id, device.kind, device.planned.existing, what),
         *_mm(place),
         *out,
-        *(f"{x:.3f}" for x in np.round([*housing, *looks], 3) + 0.0),
+        *(f"{x:.3f}" for x in np.round(angles, 3) + 0.0),
         *(second, *_mm(other), *_mm(pose[:3, 3]), *_mm(ahead)),
         *_mm(np.linalg.norm(rig.datums - place, axis=1)),
         *_mm(np.linalg.norm(rig.datums - other, axis=1)),

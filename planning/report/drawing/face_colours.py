@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh.sampling import SurfaceSamples
+from geometry.parallel import n_threads
 from planning.model.plan import RigPlan
 from planning.scene.measured import lit_samples, measured_by
 from planning.scene.placed_bodies import Obstruction
@@ -36,12 +37,13 @@ _REGIONS: tuple[Colour, ...] = (
 )
 
 
-def face_status(plan: RigPlan, *, threads: int = 2) -> NDArray[np.int8]:
+def face_status(plan: RigPlan, *, threads: int | None = None) -> NDArray[np.int8]:
     """Return what a plan does for each face at its centroid, for pictures; (n_f,).
 
     A face is measured if its centroid is; faces outside the target that aren't
     measured count as such.
     """
+    threads = threads or n_threads()
     surface, required = plan.surface, plan.requirements
     mesh = surface.mesh
     scene = Scene(

@@ -111,6 +111,8 @@ def _target(plan: RigPlan) -> str:
         return f"the {share} of the surface that you chose"
     if plan.requirements.target == "surface":
         return "the whole surface"
+    if coverage.target.area_m2 > 0.995 * coverage.surface.area_m2:
+        return "the whole surface, as it is curved alike all over"
     return f"{share} of highest curvature (--target surface: all)"
 
 

@@ -70,10 +70,11 @@ def _sigma_lines(plan: RigPlan) -> list[str]:
     limit = limits.max_sigma_m
     at_most = "" if limit is None else f" (limit {1e3 * limit:g})"
     whole = share(sigma.median_m, sigma.p95_m)
+    light = "" if limits.light is None else ", that of the light"
     panel = "" if limits.drawn_edges is None else " and the panel's pixels"
     edges = (
         f"predicted sigma along the normal, of {limits.noise_px:g} px edge noise"
-        f"{panel} alone"
+        f"{light}{panel} alone"
     )
     if limits.calibration is None:
         return [f"{edges}: {whole}{at_most}; the rig states no [calibration]"]

@@ -40,7 +40,7 @@ def device_lines(plan: RigPlan) -> list[str]:
             + (f"   {device.model}" if device.model else "")
             + (f"   existing: {device.existing}" if device.existing else "")
         )
-    x, y, z = 1e3 * centre + 0.0
+    x, y, z = np.round(1e3 * centre, 1) + 0.0
     first = axis_name(horizontal_axes(up)[0])
     return [
         *lines,
@@ -62,11 +62,17 @@ def standing(
     workspace = plan.requirements.workspace
     centre, up = np.array(workspace.centre), np.array(workspace.up)
     for device in (*plan.projectors, *plan.cameras):
-        pose = device.world_from_device
-        housing = np.degrees(pan_tilt_roll(pose[:3, :3], up))
-        aim = aim_angles(device, up)[:2]
-        distance = 1e3 * float(np.linalg.norm(pose[:3, 3] - centre))
-        yield device, [*(1e3 * pose[:3, 3]).tolist(), *housing.tolist(), *aim, distance]
+        place = device.world_from_device[:3, 3]
+        distance = 1e3 * float(np.linalg.norm(place - centre))
+        yield device, [*(1e3 * place).tolist(), *standing_angles(device, up), distance]
+
+
+def standing_angles(
+    device: PlannedProjector | PlannedCamera, up: NDArray[np.float64]
+) -> list[float]:
+    """Return a housing's pan, tilt, roll and its aim's azimuth, elevation [deg]."""
+    housing = np.degrees(pan_tilt_roll(device.world_from_device[:3, :3], up))
+    return [*housing.tolist(), *aim_angles(device, up)[:2]]
 
 
 def mount_lines(plan: RigPlan) -> list[str]:

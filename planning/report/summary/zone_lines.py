@@ -111,4 +111,4 @@ def _direction(vector: Sequence[float]) -> str:
 
 
 def _mm(point: NDArray[np.float64]) -> str:
-    return ", ".join(f"{1e3 * part + 0.0:.1f}" for part in point)
+    return ", ".join(f"{part:.1f}" for part in np.round(1e3 * point, 1) + 0.0)

@@ -8,6 +8,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.parallel import n_threads
 from planning.model.calibration_errors import (
     AS_PLANNED,
     PERFECT,
@@ -88,7 +89,7 @@ class BuiltCase:
         plan: RigPlan,
         calibration: CalibrationErrors | None = None,
         *,
-        threads: int = 2,
+        threads: int | None = None,
         later: int = 0,
     ) -> "BuiltCase":
         """Look at the samples that the plan's claims are about.
@@ -96,9 +97,10 @@ class BuiltCase:
         Args:
             plan: The plan.
             calibration: What remains unknown; None: what the plan states.
-            threads: Worker threads; no result depends on them.
+            threads: Worker threads; no result depends on them. None: all cores.
             later: Of streams of samples further on: others than the claims'.
         """
+        threads = threads or n_threads()
         scene = scene_of(plan, threads=threads)
         draw = DRAWS.claims.later(later)
         target = scene.target_samples(draw.of(plan.coverage.samples))

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from math import ceil, inf
 
-from geometry.parallel import mapped
+from geometry.parallel import mapped, n_threads
 from planning.model.calibration_errors import (
     MOST_FOCAL,
     PERFECT,
@@ -109,14 +109,15 @@ def loosest(
     *,
     n: int,
     seed: int,
-    threads: int = 2,
+    threads: int | None = None,
     report: Report = lambda line: None,
 ) -> Loosest:
     """Return the largest scale of a mounting that so many of n rigs meet, twice."""
+    cores = threads or n_threads()
 
     def sought(at: _At, words: str, focal: float) -> tuple[float, int]:
         each = [
-            _Scales(at, asked, n=n, seed=seed, stream=stream, threads=threads)
+            _Scales(at, asked, n=n, seed=seed, stream=stream, threads=cores)
             for stream in (DRAWN, CONFIRMING)
         ]
         most = MOST_FOCAL / focal if focal else inf

@@ -69,7 +69,7 @@ def sensitivities(
     case: BuiltCase,
     mounting: Mounting = AS_PLANNED,
     *,
-    threads: int = 2,
+    threads: int | None = None,
     report: Report = lambda line: None,
 ) -> tuple[Sensitivity, ...]:
     """Return those of every device and direction.

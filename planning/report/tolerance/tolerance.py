@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from geometry.parallel import mapped
+from geometry.parallel import mapped, n_threads
 from planning.model.calibration_errors import (
     AS_PLANNED,
     PERFECT,
@@ -139,7 +139,7 @@ def tolerance_of(
     n: int = 200,
     quantile: float = 0.95,
     file: StudyFile | None = None,
-    threads: int = 2,
+    threads: int | None = None,
     report: Report = lambda line: None,
 ) -> Tolerance:
     """Draw rigs and say what becomes of a plan's claims.
@@ -150,9 +150,10 @@ def tolerance_of(
         n: Rigs to draw, those of the file included.
         quantile: Share of them that must meet what is asked.
         file: Where they are kept; None: nowhere.
-        threads: Worker threads; no result depends on them.
+        threads: Worker threads; no result depends on them. None: all cores.
         report: Receives lines of progress.
     """
+    threads = threads or n_threads()
     report("coverage as planned, on the samples of the plan's claims")
     case = BuiltCase.of(plan, question.calibration, threads=threads).shared()
     asked = Asked.of(plan.requirements)

@@ -6,21 +6,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from geometry.devices import PinholeModel
 from planning.rig import optics
-from planning.rig.rig_devices import pinhole_device
+from planning.rig.rig_devices import drawn_edges, finest_view_m, pinhole_device
 from planning.rig.rig_tables import CameraTable, PinholeTable, ProjectorTable
 
 from .catalogue import FARTHEST_MM, LensEntry, device_table, split_camera
+from .fitting_optics import BALL, NEAREST, PLAY, check_range, fitting_mm, least_mm
 
-# Radius of the ball about an object over its longest side: more than half of it.
-_BALL = 0.6
-_FOCAL_MM = (100.0, 75.0, 50.0, 35.0, 25.0, 16.0, 12.0, 8.0, 6.0, 4.0)
 _STOPS = (2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 22.0)
 # Closed further, diffraction blurs more than the depth of field wins.
 _CLOSED = 11.0
 _MOST_BLUR_PX = 12
 _PROJECTOR_STOP, _PROJECTOR_BLUR_PX = 2.0, 5.0
-_PLAY = 0.05
 # Position that a dot sheet leaves at 1 m. Its angle, 0.0075 degrees, moves points by
 # 1.3e-4 of the distance; two and a half times that is what many rigs can keep.
 _SHEET_MM, _SIGMA_MM, _SIGMA_SHARE = 0.04, 0.3, 2.5 * 1.3e-4
@@ -54,7 +52,7 @@ class _Device:
     stops: Sequence[float] = (_STOPS[0], _STOPS[-1])
     sources: dict[str, str] = field(default_factory=dict[str, str])
 
-    def model(self, kind: type[PinholeTable]) -> Any:  # noqa: ANN401
+    def model(self, kind: type[PinholeTable]) -> PinholeModel:
         return pinhole_device(kind.model_validate(self.table), "device")
 
 
@@ -66,24 +64,21 @@ def new_rig(answers: Answers) -> tuple[str, list[str]]:
         RigError: If a device can't be.
     """
     chosen: list[str] = []
-    radius = _BALL * answers.object_mm
+    radius = BALL * answers.object_mm
     projector = _projector(answers)
     beam = projector.model(ProjectorTable)
-    distance = answers.distance_mm
-    if distance is None:
-        near = max(beam.range_m[0] * 1e3, 0.0) / (1.0 - _PLAY)
-        distance = _rounded(max(radius / math.sin(beam.half_angle) - radius, near))
-        if answers.camera and "+" in answers.camera:
-            view = _camera(answers, distance, chosen).model(CameraTable)
-            holds = radius / math.sin(view.half_angle) - radius
-            distance = max(distance, _rounded(max(holds, view.range_m[0] * 1e3)))
-        chosen.append(
-            f"distance {distance:g} mm from device to surface: the least from which "
-            f"one image holds the object (--distance-mm)"
-        )
-    camera = _camera(answers, distance, chosen)
-    near, far = distance * (1.0 - _PLAY), distance * (1.0 + _PLAY) + radius
-    _focus_projector(projector, near, far, chosen)
+    optics_of = {"projector": beam}
+    if answers.focal_mm or "+" in (answers.camera or ""):
+        lens = _camera(answers, 0.0, [])
+        optics_of["cameras"] = lens.model(CameraTable)
+    distance = answers.distance_mm or least_mm(optics_of, radius, chosen)
+    near, far = distance * (1.0 - PLAY), distance * (1.0 + PLAY) + radius
+    check_range(optics_of, near, far)
+    _focus_projector(projector, near, far, focused := [])
+    table = ProjectorTable.model_validate(projector.table)
+    finest_m = finest_view_m(drawn_edges(table, beam), beam, 1e-3 * distance)
+    camera = _camera(answers, distance, chosen, finest_m)
+    chosen += focused
     _focus_camera(camera, near, far, chosen)
     return _text(answers, distance, projector, camera, chosen), chosen
 
@@ -104,56 +99,38 @@ def _projector(answers: Answers) -> _Device:
     return _Device(written, dict(written), sources=sources)
 
 
-def _camera(answers: Answers, distance: float, chosen: list[str]) -> _Device:
+def _camera(
+    answers: Answers, distance: float, chosen: list[str], finest_m: float = 0.0
+) -> _Device:
     if answers.sensor_px is None:
         camera, lens = split_camera(answers.camera or "")
         device = answers.camera or ""
         if lens is None:
-            focal = answers.focal_mm or _fitting_mm(
-                camera.resolution_px, camera.pixel_um, answers, distance, chosen
+            focal = answers.focal_mm or fitting_mm(
+                (camera.resolution_px, camera.pixel_um),
+                answers.object_mm,
+                distance,
+                finest_m,
+                chosen,
             )
             device = f"{device.strip()} + {focal:g}mm"
         stops = lens.f_numbers if isinstance(lens, LensEntry) else _STOPS
         table = device_table("camera", device, {})
         return _Device({"device": device}, table, (stops[0], stops[-1]))
     size = [*answers.sensor_px]
-    focal = answers.focal_mm or _fitting_mm(
-        size, answers.pixel_um, answers, distance, chosen
+    focal = answers.focal_mm or fitting_mm(
+        (size, answers.pixel_um), answers.object_mm, distance, finest_m, chosen
     )
     written = {
         "name": f"a camera of {size[0]} x {size[1]} px with a {focal:g} mm lens",
         "resolution_px": size,
         "pixel_um": answers.pixel_um,
         "focal_mm": focal,
-        "range_mm": [10.0 * focal, FARTHEST_MM],
+        "range_mm": [NEAREST * focal, FARTHEST_MM],
     }
     sources = dict.fromkeys((*written,)[1:4], _STATED)
     sources["range_mm"] = "assumed: from ten focal lengths on"
     return _Device(written, dict(written), sources=sources)
-
-
-def _fitting_mm(
-    size: Sequence[int],
-    pixel_um: float,
-    answers: Answers,
-    distance: float,
-    chosen: list[str],
-) -> float:
-    """The longest usual lens whose image holds the object at this distance [mm]."""
-    radius = _BALL * answers.object_mm
-    half = 0.5e-3 * pixel_um * min(size)
-    for focal in _FOCAL_MM:
-        if math.sin(math.atan(half / focal)) * (distance + radius) >= radius:
-            chosen.append(
-                f"a {focal:g} mm lens: the longest usual one whose image holds the "
-                f"object (--focal-mm)"
-            )
-            return focal
-    raise ValueError(
-        f"no usual lens shows {answers.object_mm:g} mm from {distance:g} mm away with "
-        f"a sensor {2.0 * half:.2g} mm high; write a larger --distance-mm, or "
-        f"--focal-mm for images side by side"
-    )
 
 
 def _focus_projector(
@@ -196,17 +173,12 @@ def _stop(focal: float, blur_um: float, near: float, far: float) -> tuple[float,
 
 
 def _write_focus(device: _Device, distance: float, stop: float, blur: float) -> None:
-    device.written["focus"] = {
+    device.written["focus"] = device.table["focus"] = {
         "distance_mm": float(f"{distance:.0f}"),
         "f_number": stop,
         "blur_px": blur,
     }
     device.sources |= {f"focus.{key}": _FITS for key in device.written["focus"]}
-
-
-def _rounded(mm: float) -> float:
-    step = 10.0 if mm < 1000.0 else 50.0
-    return step * math.ceil(mm / step - 1e-9)
 
 
 def _text(
@@ -233,7 +205,7 @@ def _text(
         "# without it devices may stand anywhere about the object.",
         "[placement]",
         f"standoff_mm = {distance:.1f}",
-        f"standoff_play_mm = {float(f'{_PLAY * distance:.3g}')}",
+        f"standoff_play_mm = {float(f'{PLAY * distance:.3g}')}",
         "",
         "# What your calibration will leave; position in proportion to the distance.",
         "[calibration]",
@@ -257,7 +229,10 @@ def _text(
             f"max_bias_mm = {sigma / 8:.2g}",
             "",
         ]
-        chosen.append(f"sigma up to {sigma:g} mm, from so far away")
+        chosen.append(
+            f"a sigma up to {sigma:g} mm counts as measured, not {_SIGMA_MM:g}: from "
+            f"so far away a calibration leaves more (max_sigma_mm)"
+        )
     return "\n".join(lines)
 
 

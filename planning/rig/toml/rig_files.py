@@ -16,7 +16,7 @@ from pydantic_core import ErrorDetails
 from geometry.files.file_content import file_content
 from planning.model.errors import RigError
 from planning.model.files import reading
-from planning.model.table_types import fault_words
+from planning.model.table_types import fault_words, told_once
 from planning.rig.rig_tables import RigTable
 
 from .laying import DEVICES, lay_over
@@ -44,7 +44,7 @@ def read_rig(source: str | Path | Mapping[str, Any]) -> RigTable:
     try:
         table = RigTable.model_validate(tables)
     except ValidationError as error:
-        entries = error.errors(include_url=False)
+        entries = told_once(error.errors(include_url=False))
         for entry in entries:
             entry["loc"] = _in_list(entry["loc"])
         faults += [_fault(e) for e in entries if not _follows(e, named.broken)]
@@ -100,7 +100,13 @@ def _read_file(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(content.decode())
     except ValueError as error:
-        raise RigError(f"{path}: not TOML ({error}); correct that line") from None
+        remedy = "correct that line"
+        if "overwrite" in str(error):
+            remedy = (
+                "a key stands there twice; with tables of its own a device is "
+                'named within: [projector] device = "NAME"'
+            )
+        raise RigError(f"{path}: not TOML ({error}); {remedy}") from None
 
 
 def _fault(entry: ErrorDetails) -> str:

@@ -15,6 +15,8 @@ from planning.model.errors import InputError
 
 # As the largest number of a rig file: beyond any rig.
 _LARGEST = 1e9
+# Columns that are named of a file that is another's.
+_TOLD = 6
 
 
 @dataclass(frozen=True)
@@ -114,8 +116,10 @@ def _check_header(
     twice = sorted({name for name in names if names.count(name) > 1})
     for what, which in (("lacks", missing), ("doesn't know", strange)):
         if which:
+            more = f" and {len(which) - _TOLD} more" if len(which) > _TOLD else ""
+            told = ", ".join(map(repr, which[:_TOLD])) + more
             raise InputError(
-                f"{where}: the header {what} {', '.join(map(repr, which))}; columns "
+                f"{where}: the header {what} {told}; columns "
                 f"are {', '.join(required)} and, if need be, {', '.join(optional)}"
             )
     if twice:

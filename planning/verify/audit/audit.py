@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from functools import cached_property
 
+from geometry.parallel import n_threads
 from planning.model.errors import PlanFileError
 from planning.model.plan import RigPlan
 from planning.verify.audit.baselines.baseline_claims import audit_baselines
@@ -100,7 +101,7 @@ class Audit:
 
 
 def audit_plan(
-    plan: RigPlan, *, seed: int = 0, n_samples: int = 20_000, threads: int = 2
+    plan: RigPlan, *, seed: int = 0, n_samples: int = 20_000, threads: int | None = None
 ) -> Audit:
     """Recompute every claim of a plan from its document and its surface alone.
 
@@ -115,6 +116,7 @@ def audit_plan(
             f"requirements.pattern is {plan.requirements.pattern!r}; only 'rings' can "
             f"be audited"
         )
+    threads = threads or n_threads()
     case = examine(plan, seed=seed, n_samples=n_samples, threads=threads)
     findings = AuditFindings()
     for audit_claims in _CLAIMS:

@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 
 from geometry.mesh.sampling import sample_surface
+from geometry.parallel import n_threads
 from planning.verify.reconstruction.check.accuracy import (
     Expected,
     judge,
@@ -47,7 +48,7 @@ def reconstruct(
     plan: Scanner,
     *,
     seed: int,
-    threads: int = 2,
+    threads: int | None = None,
     truth: Scanner | None = None,
     expected: Expected | None = None,
     photometry: Photometry | None = None,
@@ -59,7 +60,7 @@ def reconstruct(
     Args:
         plan: What the decoder believes: poses, optics, patterns; its mesh is compared.
         seed: Of the pixel noise; every frame draws from a stream of its own.
-        threads: Worker threads; the result doesn't depend on them.
+        threads: Worker threads; no result depends on them. None: all cores.
         truth: What really stands there, devices matched by id; the plan by default. A
             device that it lacks is off.
         expected: Points of the surface to judge completeness on, and which of them the
@@ -72,6 +73,7 @@ def reconstruct(
     Raises:
         InputError: If Mitsuba is asked for and isn't installed, or lacks a lens.
     """
+    threads = threads or n_threads()
     light, spent = photometry or assumed_light(plan), Spent()
     draw = decode_rendered
     if physics is not None:
@@ -103,7 +105,7 @@ def reconstruct_twice(
     plan: Scanner,
     *,
     seed: int,
-    threads: int = 2,
+    threads: int | None = None,
     mounted: Scanner | None = None,
     expected: Expected | None = None,
     photometry: Photometry | None = None,
@@ -115,6 +117,7 @@ def reconstruct_twice(
     of `reconstruct`; `mounted` is how the devices stand, as the decoder knows, too. The
     second sequence's noise is another.
     """
+    threads = threads or n_threads()
     light, stands = photometry or assumed_light(plan), mounted or plan
     if expected is None:
         expected = _fresh(plan, seed)

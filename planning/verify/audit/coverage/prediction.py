@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from geometry.arrays import Array, Mask
+from geometry.parallel import n_threads
 from planning.model.plan import RigPlan
 from planning.model.requirements import Requirements
 from planning.verify.audit.audit_samples import AuditSamples, draw_samples
@@ -28,7 +29,7 @@ _SLANT, _SLANT_MARGIN = float(np.deg2rad(65.0)), float(np.deg2rad(5.0))
 
 
 def predict_measured(
-    plan: RigPlan, *, seed: int, n_samples: int = 20_000, threads: int = 2
+    plan: RigPlan, *, seed: int, n_samples: int = 20_000, threads: int | None = None
 ) -> Recomputed:
     """Return what the poses of a plan should measure of samples of the target.
 
@@ -37,6 +38,7 @@ def predict_measured(
     Raises:
         PlanFileError: If the target has no area.
     """
+    threads = threads or n_threads()
     drawn = draw_samples(plan.surface, plan.requirements.target, n_samples, seed)
     samples = drawn.take(drawn.in_target)
     return recompute(plan, samples, Shadow.of(plan, threads=threads))

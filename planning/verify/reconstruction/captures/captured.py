@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from geometry.parallel import n_threads
 from planning.model.errors import CapturesError
 from planning.verify.reconstruction.arrays import Images
 from planning.verify.reconstruction.check.accuracy import Expected
@@ -45,7 +46,7 @@ def reconstruct_rendered(
     expected: Expected,
     *,
     seed: int,
-    threads: int = 2,
+    threads: int | None = None,
     truth: Scanner | None = None,
     believed: Scanner | None = None,
     photometry: Photometry | None = None,
@@ -59,7 +60,7 @@ def reconstruct_rendered(
         plan: For which the patterns are drawn.
         expected: By the plan.
         seed: Of the pixel noise.
-        threads: Worker threads; the result doesn't depend on them.
+        threads: Worker threads; no result depends on them. None: all cores.
         truth: What really stands there; the plan by default.
         believed: What the decoder knows of poses and optics; the plan by default.
         photometry: Simulated light and sensor; None: as the plan's check assumes.
@@ -70,6 +71,7 @@ def reconstruct_rendered(
     Raises:
         OSError: If the images can't be written.
     """
+    threads = threads or n_threads()
     light, spent = photometry or assumed_light(plan), Spent()
     inspection = _Inspection(plan)
 
@@ -100,7 +102,7 @@ def reconstruct_captured(
     *,
     believed: Scanner | None = None,
     mend: bool = False,
-    threads: int = 2,
+    threads: int | None = None,
     progress: Progress | None = None,
 ) -> Reconstruction:
     """Reconstruct from images that cameras took.
@@ -113,7 +115,7 @@ def reconstruct_captured(
         expected: By the plan.
         believed: What was measured of poses and optics; the plan by default.
         mend: Whether the rig is refined over the edges first.
-        threads: Worker threads; the result doesn't depend on them.
+        threads: Worker threads; no result depends on them. None: all cores.
         progress: Called with the pairs done and their total.
 
     Raises:
@@ -132,7 +134,7 @@ def reconstruct_captured(
             patterns = inspection.patterns(pair)
             return decode(frames, patterns, known[pair], **plan.limits.decoder)
 
-    pairs = over_pairs(plan, measure, threads=threads, progress=progress)
+    pairs = over_pairs(plan, measure, threads=threads or n_threads(), progress=progress)
     inspection.require_some()
     return _concluded(plan, believed, pairs, inspection, expected, spent, mend)
 
