@@ -3,9 +3,10 @@
 import * as THREE from "three";
 
 import { Devices, zonesAndObstacles } from "./devices.js";
-import { byId, element } from "./dom.js";
+import { byId, element, theme } from "./dom.js";
 import { Eye } from "./eyes.js";
 import { Layers } from "./layers.js";
+import { bends, lookThrough } from "./lens.js";
 import { dots, Measure } from "./measure.js";
 import { Panel } from "./panel.js";
 import { meshOf, unpack } from "./payload.js";
@@ -13,7 +14,6 @@ import { Picking } from "./picking.js";
 import { Sequence } from "./sequence.js";
 import { Stage } from "./stage.js";
 import { Surface } from "./surface.js";
-import { theme } from "./theme.js";
 
 // Smooth edges cost a software renderer five times as long; finer meshes need them less.
 const SMOOTH = 300000;
@@ -40,6 +40,12 @@ async function start() {
   const mark = dots(new THREE.BufferGeometry());
   mark.frustumCulled = false;
   stage.scene.add(mark);
+
+  stage.scene.traverse((thing) => {
+    // A lens may bend into the picture what lies beside it.
+    thing.frustumCulled = false;
+    if (thing.material && !thing.material.isShaderMaterial) bends(thing.material);
+  });
 
   const isOn = (name) => byId(`show-${name}`)?.checked ?? false;
   const rings = projectors.map((p) => check("rings-of", `rings-${p.id}`, p.id, false));
@@ -79,6 +85,7 @@ async function start() {
     const chosen = byId("view").value;
     stage.eye = eyes.find((eye) => eye.device.id === chosen) ?? null;
     stage.eye?.zoom(1e-9);
+    lookThrough(stage.eye?.lens ?? null);
     const turned = { all: {}, object: { places: objectPlaces(facts) } }[chosen];
     const flat = { top: [-Math.PI / 2, 1.57], front: [-Math.PI / 2, 0], side: [0, 0] }[chosen];
     if (turned) stage.frame({ turn: facingDevices(stage, facts), ...turned });

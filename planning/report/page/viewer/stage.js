@@ -198,7 +198,7 @@ export class Stage {
 
   // A point of the world on the canvas in pixels; null behind the camera.
   spot(point) {
-    const at = point.clone().project(this.camera);
+    const at = this.eye ? this.eye.project(point) : point.clone().project(this.camera);
     if (at.z > 1 || at.z < -1) return null;
     const view = this.window;
     return [view.left + (0.5 + 0.5 * at.x) * view.wide, view.top + (0.5 - 0.5 * at.y) * view.high];
