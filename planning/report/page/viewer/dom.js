@@ -19,7 +19,8 @@ export function theme(changed) {
   const isDark = () => (root.dataset.theme ?? (system.matches ? "dark" : "light")) === "dark";
   const apply = () => {
     byId("theme").textContent = isDark() ? "Light page" : "Dark page";
-    changed(getComputedStyle(root).getPropertyValue("--canvas").trim());
+    const style = getComputedStyle(root);
+    changed(...["--canvas", "--beside"].map((name) => style.getPropertyValue(name).trim()));
   };
   byId("theme").addEventListener("click", () => {
     root.dataset.theme = isDark() ? "light" : "dark";

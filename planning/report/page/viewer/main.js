@@ -125,7 +125,7 @@ async function start() {
     const hit = picking.at(x, y);
     if (hit) choose(hit.face, hit.point);
   };
-  theme((colour) => stage.setBackground(colour));
+  theme((colour, beside) => stage.setBackground(colour, beside));
   sequence.go(-1);
   layers.show();
   look();
