@@ -2,7 +2,7 @@
 
 import * as THREE from "three";
 
-import { Devices, zonesAndObstacles } from "./devices.js";
+import { Devices, matrix, panelCorners, zonesAndObstacles } from "./devices.js";
 import { byId, element, theme } from "./dom.js";
 import { Eye } from "./eyes.js";
 import { Layers } from "./layers.js";
@@ -26,7 +26,7 @@ async function start() {
   Surface.LIT = facts.causes.light.length;
   const surface = new Surface(meshOf(arrays, "mesh"), facts.mesh, projectors, arrays.get("light"));
   const up = new THREE.Vector3(...facts.up);
-  const stage = new Stage(byId("canvas"), surface.count < SMOOTH, objectCentre(facts), up, [...objectPlaces(facts), ...devicePlaces(facts)]);
+  const stage = new Stage(byId("canvas"), surface.count < SMOOTH, objectCentre(facts), up, [...objectPlaces(facts), ...devicePlaces(facts), ...panelPlaces(facts)]);
   stage.scene.add(surface.mesh);
   const devices = new Devices(stage, facts, byId("labels"));
   const { zones, obstacles } = zonesAndObstacles(facts, (name) => meshOf(arrays, name));
@@ -152,6 +152,10 @@ function check(into, id, words, checked) {
 
 const objectCentre = ({ mesh }) => new THREE.Vector3(...mesh.low.map((low, k) => low + 0.5 * mesh.side[k]));
 const devicePlaces = ({ devices }) => devices.map(({ pose }) => new THREE.Vector3(...pose.slice(0, 3).map((row) => row[3])));
+
+// Corners of panels in parallel light, which are as large as their beams.
+const panelPlaces = ({ devices }) =>
+  devices.filter(({ K }) => !K).flatMap((device) => panelCorners(device).map((c) => c.applyMatrix4(matrix(device.pose))));
 
 // Corners of the object's box.
 function objectPlaces({ mesh }) {
