@@ -1,11 +1,13 @@
 """Run by a Python that has `bpy`: build a rig by its script, tell pixels of points.
 
-python inside_blender.py FOLDER, which holds build_rig.py, points.npz and patterns/. The
-light of the first projector is rendered by Cycles onto a plane before it, as seen from
-its own place: what it shows must be its pattern, pixel for pixel.
+python inside_blender.py FOLDER, which holds build_rig.py, points.npz and patterns/.
+What Blender keeps of each camera, in single precision, goes into kept.json. The light
+of the first projector with a pattern is rendered by Cycles onto a plane before it, as
+seen from its own place: what it shows must be its pattern, pixel for pixel.
 """
 
 import contextlib
+import json
 import os
 import runpy
 import sys
@@ -31,6 +33,21 @@ def pixels(folder: Path) -> dict[str, np.ndarray]:
         places = [[x * width, (1 - y) * height] for x, y, _ in seen]
         found[name] = np.array(places) - 0.5
     return found
+
+
+def kept(device: dict) -> dict:
+    """Return the numbers of a camera as Blender has them after the script ran."""
+    scene = bpy.data.scenes[device["id"]]
+    camera, render = scene.camera.data, scene.render
+    return {
+        "pose": [list(row) for row in scene.camera.matrix_world],
+        "K": device["K"],
+        "focal": camera.lens / camera.sensor_width,
+        "width_m": camera.ortho_scale,
+        "shift": [camera.shift_x, camera.shift_y],
+        "pixel_aspect": [render.pixel_aspect_x, render.pixel_aspect_y],
+        "resolution": [render.resolution_x, render.resolution_y],
+    }
 
 
 def light(folder: Path, device: dict) -> str:
@@ -83,6 +100,9 @@ if __name__ == "__main__":
     place = Path(sys.argv[1])
     devices = runpy.run_path(str(place / "build_rig.py"))["DEVICES"]
     found = pixels(place)
-    told = light(place, next(d for d in devices if d["pattern"]))
+    numbers = {device["id"]: kept(device) for device in devices}
+    (place / "kept.json").write_text(json.dumps(numbers))
+    shining = [d for d in devices if d["pattern"] and d["K"] is not None]
+    told = light(place, shining[0]) if shining else "no projector shows an image"
     version = bpy.app.version_string
     np.savez(place / "pixels.npz", version=version, light=told, **found)

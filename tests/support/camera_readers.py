@@ -233,22 +233,48 @@ def aim_table(folder: Path, points: Points) -> dict[str, tuple[Array, Array]]:
 
 
 def mitsuba(folder: Path, points: Points) -> dict[str, Array]:
-    """By where Mitsuba's sensors see points, and its projectors light them."""
+    """By where Mitsuba's sensors see points, and its projectors light them.
+
+    A projector with a pupil is many pinholes about its middle: their mean.
+    """
     import mitsuba as mi
 
     mi.set_variant("llvm_ad_rgb")
     found: dict[str, Array] = {}
     for path in sorted(folder.glob("*.xml")):
         scene = mi.load_file(str(path))
-        light = scene.emitters()[0]
-        towards, _ = light.sample_direction(_at(mi, points[path.stem]), mi.Point2f(0.5))
         shown = mi.Bitmap(str(folder / "patterns" / path.stem / "00-white.png"))
-        found[path.stem] = np.array(towards.uv).T * shown.size() - 0.5
+        at, lit = _at(mi, points[path.stem]), list[Array]()
+        for light in scene.emitters():
+            if light.id().startswith("light"):
+                towards, _ = light.sample_direction(at, mi.Point2f(0.5))
+                lit.append(np.array(towards.uv, dtype=np.float64).T)
+        found[path.stem] = np.mean(lit, axis=0) * shown.size() - 0.5
     for sensor in scene.sensors():
         name = sensor.id()
+        if sensor.needs_aperture_sample():
+            found[name] = _by_rays(mi, sensor, points[name])
+            continue
         seen, _ = sensor.sample_direction(_at(mi, points[name]), mi.Point2f(0.5))
         found[name] = np.array(seen.uv).T - 0.5
     return found
+
+
+def _by_rays(mi: Any, sensor: Any, points: Array) -> Array:
+    """Pixels by a thin lens's rays through its middle, which are a pinhole's.
+
+    Its `sample_direction` gives pixels that are too large by the focus distance.
+    """
+    film = np.random.default_rng(0).random((1000, 2)).astype(np.float32)
+    ray, _ = sensor.sample_ray(0.0, 0.5, mi.Point2f(film.T), mi.Point2f(0.5))
+    # In an AD variant the matrix has a width of one.
+    pose = np.array(sensor.world_transform().matrix, dtype=np.float64).reshape(4, 4)
+    local = np.linalg.solve(pose[:3, :3], np.array(ray.d, dtype=np.float64))
+    slopes = np.vstack([local[:2] / local[2], np.ones(len(film))])
+    matrix = np.linalg.lstsq(slopes.T, film.astype(np.float64), rcond=None)[0]
+    seen = _into(pose, points)
+    slopes = np.column_stack([seen[:, :2] / seen[:, 2:], np.ones(len(seen))])
+    return slopes @ matrix * sensor.film().crop_size() - 0.5
 
 
 def _at(mi: Any, points: Array) -> Any:

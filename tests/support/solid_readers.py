@@ -66,7 +66,7 @@ def step_opencascade(folder: Path, rig: ExportedRig) -> tuple[float, str]:
         each.Next()
     want = [8e9 * np.prod(d.box.half) for d in rig.devices if d.box is not None]
     # Of a volume the side of a cube that would be as much larger.
-    off = np.abs(np.cbrt(volumes) - np.cbrt(want)).max()
+    off = np.abs(np.cbrt(volumes) - np.cbrt(want)).max(initial=0.0)
     return float(off), f"{len(volumes)} valid solids, their volumes; {wires} wires"
 
 

@@ -226,6 +226,23 @@ class ExportedRig:
         ]
 
     @property
+    def lacks(self) -> list[str]:
+        """Return a sentence where the plan itself lacks what its rig file says."""
+        terms = self.plan.document.rig.projector.distortion
+        new = [
+            each
+            for each in self.devices
+            if each.kind == "projector" and not each.planned.existing
+        ]
+        if not (terms and any(terms) and new):
+            return []
+        words = ", ".join(f"{term:g}" for term in terms)
+        return [
+            f"{id_words(new)}: without the rig file's distortion of projectors "
+            f"({words}), a plan's projectors have none"
+        ]
+
+    @property
     def parallel(self) -> list[ExportedDevice]:
         """Projectors of parallel light."""
         return [each for each in self.devices if isinstance(each.model, ParallelModel)]

@@ -16,7 +16,7 @@ NAME = "mitsuba"
 
 def mitsuba_lacks(rig: ExportedRig) -> list[str]:
     """Return a sentence for distortion, and one for parallel light."""
-    sentences: list[str] = []
+    sentences = rig.lacks
     if rig.distorted:
         sentences.append(
             f"{id_words(rig.distorted)}: without distortion, Mitsuba has no such lens"
@@ -24,7 +24,7 @@ def mitsuba_lacks(rig: ExportedRig) -> list[str]:
     if rig.parallel:
         sentences.append(
             f"{id_words(rig.parallel)}: parallel light comes from a pinhole 100 km "
-            f"away, which Mitsuba's single precision puts millimetres aside"
+            f"away, and strays by up to 0.4 um; Mitsuba 3.9 puts it up to 1.2 mm aside"
         )
     return sentences
 

@@ -39,7 +39,7 @@ def write_export(rig: ExportedRig, form: ExportFormat, folder: Path) -> Exported
     Raises:
         OSError: If it can't be written.
     """
-    lacks = form.lacks(rig)
+    lacks = [*rig.lacks, *form.lacks(rig)]
     files = form.files(rig)
     files[README] = _readme(rig, form, lacks, list(files)).encode()
     old = _listed(folder)

@@ -1,5 +1,6 @@
 """HTML from values: whatever comes from a file is escaped here, once."""
 
+import re
 from collections.abc import Iterable, Sequence
 from html import escape
 
@@ -19,8 +20,13 @@ def element(name: str, content: str, **attributes: str) -> str:
 
 
 def paragraphs(lines: Iterable[str], **attributes: str) -> str:
-    """Return plain text as paragraphs."""
-    return "".join(element("p", escape(line), **attributes) for line in lines)
+    """Return plain text as paragraphs; no option is broken at its hyphens."""
+
+    def marked(line: str) -> str:
+        option = r'<span class="option">\g<0></span>'
+        return re.sub(r"--[a-z][a-z-]*", option, escape(line))
+
+    return "".join(element("p", marked(line), **attributes) for line in lines)
 
 
 def table(

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from geometry.arrays import Array
+from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import horizontal_axes
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
@@ -21,6 +22,7 @@ from planning.report.summary.device_lines import axis_name
 from planning.scene.placed_bodies import kind_of
 
 from .markup import element
+from .outline import outlines
 
 # Of a view: its side, what numbers take of it, and the height of a number [user units].
 _SIDE, _MARGIN, _TEXT = 420.0, 76.0, 11.0
@@ -53,17 +55,15 @@ def wall_sheet(plan: RigPlan) -> str:
         _View(f"Top, seen along {axis_name(-up)}", first, second),
     )
     centre = np.array(plan.requirements.workspace.centre)
-    shapes = _shapes(plan)
+    mesh, shapes = plan.surface.mesh, _shapes(plan)
     # One scale for all three: a length is the same on each.
     widest = max(float(np.ptp(_bounds(view, shapes), axis=0).max()) for view in views)
     per_mm = (_SIDE - _MARGIN - 2.0 * _INSET) / widest
     drawings = "".join(
-        element("figure", _drawn(view, shapes, centre, per_mm)) for view in views
+        element("figure", _drawn(view, mesh, shapes, centre, per_mm)) for view in views
     )
     x, y, z = 1e3 * centre + 0.0
-    size = " x ".join(
-        f"{side:.1f}" for side in 1e3 * np.ptp(plan.surface.mesh.bounds, 0)
-    )
+    size = " x ".join(f"{side:.1f}" for side in 1e3 * np.ptp(mesh.bounds, 0))
     note = (
         f"Numbers are millimetres from the object's centre, which is at {x:.1f}, "
         f"{y:.1f}, {z:.1f} in the axes of the mesh file; the object is {size} mm along "
@@ -80,7 +80,7 @@ def _bounds(view: _View, shapes: Sequence[tuple[str, str, Array]]) -> Array:
 
 def _shapes(plan: RigPlan) -> list[tuple[str, str, Array]]:
     """Class, name and outline's points of the object and every device [m]."""
-    shapes = [("object", "", plan.surface.mesh.corners.reshape(-1, 3))]
+    shapes = [("object", "", plan.surface.mesh.vertices)]
     size = 0.05 * max(plan.requirements.workspace.projector_radius_m)
     for figure in device_figures(plan, body_m=size):
         device: PlannedProjector | PlannedCamera = figure.device
@@ -90,7 +90,11 @@ def _shapes(plan: RigPlan) -> list[tuple[str, str, Array]]:
 
 
 def _drawn(
-    view: _View, shapes: Sequence[tuple[str, str, Array]], centre: Array, per_mm: float
+    view: _View,
+    mesh: TriangleMesh,
+    shapes: Sequence[tuple[str, str, Array]],
+    centre: Array,
+    per_mm: float,
 ) -> str:
     middle = np.array([0.5 * (_SIDE + _MARGIN), 0.5 * (_SIDE - _MARGIN)])
     about = _bounds(view, shapes).mean(axis=0)
@@ -102,14 +106,15 @@ def _drawn(
     (x, y), parts = placed(centre[None])[0], list[str]()
     for ends in ((_MARGIN, y, _SIDE, y), (x, 0.0, x, edge)):
         parts.append(_line("axis", *ends))
+    curves = outlines(placed(mesh.vertices)[mesh.faces])
+    told = " ".join(f"M{_points(curve)}Z" for curve in curves)
+    parts.append(f'<path class="object" fill-rule="evenodd" d="{told}"/>')
     spots: dict[str, Array] = {}
-    for kind, name, points in shapes:
-        outline = _hull(placed(points))
-        told = " ".join(f"{a:.1f},{b:.1f}" for a, b in outline)
-        parts.append(f'<polygon class="{kind}" points="{told}"/>')
-        if name:
-            # The last point is where the device's origin is.
-            spots[name] = points[-1]
+    for kind, name, points in shapes[1:]:
+        outline = _points(_hull(placed(points)))
+        parts.append(f'<polygon class="{kind}" points="{outline}"/>')
+        # The last point is where the device's origin is.
+        spots[name] = points[-1]
     at = {name: placed(spot[None])[0] for name, spot in spots.items()}
     for name, (a, b) in at.items():
         parts.append(f'<circle class="origin" cx="{a:.1f}" cy="{b:.1f}" r="2"/>')
@@ -166,6 +171,10 @@ def _scale_bar(per_mm: float) -> str:
     left, y = 6.0, _SIDE - 6.0
     bar = _line("bar", left, y, left + length * per_mm, y)
     return bar + _text("scale", left, y - 4.0, f"{length:g} mm")
+
+
+def _points(flat: Array) -> str:
+    return " ".join(f"{a:.1f},{b:.1f}" for a, b in flat)
 
 
 def _hull(flat: Array) -> Array:

@@ -13,6 +13,7 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 from support.camera_readers import aim_table
 from support.exported_plans import exported_plan, points_before
+from support.reconstruction_rigs import changed
 from support.solid_readers import mounts
 
 from geometry.devices import PinholeModel
@@ -77,6 +78,17 @@ def pose_of(quaternion_wxyz, translation):
     pose[:3, :3] = Rotation.from_quat(np.roll(quaternion_wxyz, -1)).as_matrix()
     pose[:3, 3] = translation
     return pose
+
+
+def test_distortion_of_projectors_that_the_plan_lost_is_told(tmp_path):
+    def bent(document):
+        document["rig"]["projector"]["distortion"] = [-0.03, 0.01, 0.0, 0.0, 0.0]
+
+    plan = changed(exported_plan(), bent)
+    bare = ExportedRig.of(plan, frame_of(None, plan.requirements.workspace))
+    for form in FORMATS[:2]:
+        lacks = write_export(bare, form, tmp_path / form.name).lacks
+        assert "P1, P2: without the rig file's distortion" in lacks[0]
 
 
 def test_opencv_s_matrices_re_project(rig, folder):

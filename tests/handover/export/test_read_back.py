@@ -1,18 +1,21 @@
 """The other side's own code re-projects what the plan does; skipped where it's absent.
 
-`pip install 'ringrig[exports-check]'` has the readers.
+`pip install 'ringrig[exports-check,render]'` has the readers.
 """
 
 import numpy as np
 import pytest
 from support import camera_readers as readers
+from support import double_readers as doubles
 from support import solid_readers as solids
 from support.exported_plans import exported_plan, points_before
 
 from planning.handover.export.export_formats import FORMATS
 from planning.handover.export.export_frames import frame_of
 from planning.handover.export.exported_rig import ExportedRig
+from planning.handover.export.mitsuba_export import write_mitsuba
 from planning.handover.export.write_exports import write_export
+from planning.verify.reconstruction.render.mitsuba.materials import Surface
 
 FORM = {form.name: form for form in FORMATS}
 
@@ -54,6 +57,23 @@ def test_points_re_project_within_a_millionth_of_a_pixel(
         if device.id in found:
             want = device.project(points[device.id])
             np.testing.assert_allclose(found[device.id], want, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("reader", "off_px"), [(doubles.mitsuba_in_double, 1e-6), (readers.mitsuba, 1e-3)]
+)
+def test_mitsuba_s_scenes_re_project_as_far_as_its_precision_goes(
+    reader, off_px, rig, tmp_path
+):
+    pytest.importorskip("mitsuba", reason="mitsuba isn't installed: render")
+    write_mitsuba(rig, tmp_path, Surface(), None)
+    points = {device.id: points_before(device) for device in rig.devices}
+    found = reader(tmp_path, points)
+    # C1's distortion is left out, and P2's parallel light comes from 100 km away.
+    for name, off in {"P1": off_px, "C2": off_px, "C3": off_px, "P2": 3e-3}.items():
+        device = next(each for each in rig.devices if each.id == name)
+        want = device.project(points[name])
+        np.testing.assert_allclose(found[name], want, atol=off)
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,7 @@ from planning.cli.main import commands
 from planning.cli.saved_plans import SavedPlans
 from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
+from planning.report.page.outline import outlines
 from planning.report.page.page import error_by_face, is_page, page_of, write_page
 from planning.report.page.payload import NOTHING, Payload, add_mesh, quantised
 from planning.report.page.per_face import centroids, per_face
@@ -228,6 +229,31 @@ def test_the_wall_sheet_has_the_distances_from_the_centre(plan):
     for device in (*plan.projectors, *plan.cameras):
         for value in 1e3 * (device.world_from_device[:3, 3] - centre):
             assert f">{device.id} {value + 0.0:+.0f}<" in sheet
+
+
+@pytest.mark.parametrize("pieces", [16, 4000])
+def test_outlines_are_those_of_what_triangles_cover(pieces):
+    # Quadrilaterals between two circles, of many cells or of less than one.
+    turn = np.linspace(0.0, 2.0 * np.pi, pieces + 1)
+    rim = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    inner, outer = 300.0 + 20.0 * rim, 300.0 + 21.0 * rim
+    if pieces == 16:
+        outer = 300.0 + 50.0 * rim
+    halves = [inner[:-1], outer[:-1], outer[1:]], [inner[:-1], outer[1:], inner[1:]]
+    curves = outlines(np.concatenate([np.stack(half, axis=1) for half in halves]))
+    assert len(curves) == 2
+    for curve, wanted in zip(sorted(curves, key=np.ptp), (inner, outer), strict=True):
+        for axis in (0, 1):
+            ends = [getattr(np, end)(curve[:, axis]) for end in ("min", "max")]
+            wants = [getattr(np, end)(wanted[:, axis]) for end in ("min", "max")]
+            np.testing.assert_allclose(ends, wants, atol=0.41)
+        x, y = curve.T
+        a, b = wanted[:-1].T
+        area = abs(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
+        want = abs(np.sum(a * np.roll(b, -1) - b * np.roll(a, -1)))
+        # Within two cells of the border.
+        length = np.linalg.norm(np.diff(wanted, axis=0), axis=1).sum()
+        assert abs(area - want) < 2.0 * 0.4 * length
 
 
 def test_errors_are_means_of_the_points_on_each_face():

@@ -1,10 +1,14 @@
 """The page in Debian's Chromium, without a network: everything that it offers works.
 
-Left out where Chromium and its driver aren't installed.
+Left out where Chromium and its driver aren't installed. Folders of plans between colons
+in REPORT_PLANS are opened as well.
 """
 
 import dataclasses
+import os
 import re
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,12 +31,13 @@ pytestmark = pytest.mark.skipif(
 
 # A face that the surface shows to the viewer, and where it is on the canvas.
 FACING = """
-const {stage, surface} = ringrig;
+const {stage, surface, picking} = ringrig;
 const to = stage.free.position;
 for (const face of arguments[0]) {
   const at = surface.centroid(face);
   if (surface.normal(face).dot(to.clone().sub(at).normalize()) < 0.5) continue;
   const [x, y] = stage.spot(at);
+  if (picking.at(x, y)?.face !== face) continue;
   const size = [stage.canvas.clientWidth, stage.canvas.clientHeight];
   return [face, Math.round(x - size[0] / 2), Math.round(y - size[1] / 2)];
 }"""
@@ -43,10 +48,18 @@ return arguments[0].map((face) => {
   const [x, y] = stage.spot(surface.centroid(face)) ?? [NaN, NaN];
   return [(x - w.left) / w.wide, (y - w.top) / w.high];
 });"""
+# What the shaders drew at places of a device's image, and how far aside the point is.
+DRAWN = """
+const {stage, picking, surface} = ringrig;
+const w = stage.window;
+return arguments[0].map(([x, y]) => {
+  const hit = picking.at(w.left + x * w.wide, w.top + y * w.high);
+  return hit && [hit.face, ...hit.point.toArray()];
+});"""
 
 
 def with_obstacle() -> RigPlan:
-    """A wall beside the object, a room about it, bodies, and a floor that is missed."""
+    """A wall beside the object, a room, bodies, and cameras whose lenses distort."""
     plan = unclaimed()
     wall = box((0.02, 0.3, 0.3))
     mesh = TriangleMesh(wall.vertices + [0.2, 0.0, 0.5], wall.faces)
@@ -58,6 +71,8 @@ def with_obstacle() -> RigPlan:
         document["requirements"]["workspace"]["box"] = room
         for camera in document["cameras"]:
             camera["body"] = {"centre_m": [0, 0, -0.05], "half_m": [0.02, 0.02, 0.05]}
+            # Up to 10 pixels of it.
+            camera["distortion"] = [-8.0, 100.0, 0.1, -0.08, 0.0]
 
     surface = dataclasses.replace(plan.surface, obstacles=(Obstacle("wall", mesh),))
     return RigPlan(tampered(plan, change).document, surface)
@@ -67,6 +82,9 @@ PLANS = {
     "diverging": unclaimed,
     "parallel": lambda: unclaimed("parallel"),
     "obstacle": with_obstacle,
+} | {
+    folder: partial(RigPlan.load, Path(folder) / "plan.json")
+    for folder in filter(None, os.environ.get("REPORT_PLANS", "").split(":"))
 }
 
 
@@ -165,6 +183,12 @@ def test_a_device_s_view_is_its_own_image(shown):
     plan, page = shown
     faces = np.arange(0, len(plan.surface.mesh.faces), 61)
     points = plan.surface.mesh.face_centroids[faces]
+    aside = plan.surface.mesh.corners[faces, 0] - points
+    # Steps in which the page tells places; just inside of a corner are a hundred.
+    step = np.ptp(plan.surface.mesh.bounds, axis=0).max() / 65535
+    spare = 100.0 * step / np.linalg.norm(aside, axis=1, keepdims=True)
+    points = np.stack([points, points + np.maximum(1.0 - spare, 0.0) * aside])
+    normals = plan.surface.mesh.face_normals[faces]
     for device in (*plan.projectors, *plan.cameras):
         page.choose("view", device.id)
         spots = np.array(page.run(SPOTS, faces.tolist()), dtype=float)
@@ -172,13 +196,21 @@ def test_a_device_s_view_is_its_own_image(shown):
         local = (points - pose[:3, 3]) @ pose[:3, :3]
         width, height = optics.resolution
         if hasattr(optics, "camera_matrix"):
-            optics = dataclasses.replace(optics, distortion=(0.0,) * 5)
             pixels = optics.project(local)
         else:
-            pixels = local[:, :2] / optics.pixel_pitch_m
+            pixels = local[..., :2] / optics.pixel_pitch_m
             pixels += 0.5 * (np.array([width, height]) - 1.0)
         shares = (pixels + 0.5) / [width, height]
-        np.testing.assert_allclose(spots, shares, atol=2e-3)
+        np.testing.assert_allclose(spots, shares[0], atol=2e-5)
+        # And the shaders drew the face there, as far as just inside of its corner.
+        facing = np.sum((pose[:3, 3] - points[1]) * normals, axis=1) > 0.2
+        facing &= np.all((shares[1] > 0.0) & (shares[1] < 1.0), axis=1)
+        drawn = page.run(DRAWN, shares[1].tolist())
+        for k in np.flatnonzero(facing):
+            found = np.array(drawn[k][1:])
+            if (found - points[1, k]) @ pose[:3, 2] > -1e-4:
+                assert drawn[k][0] == faces[k]
+                np.testing.assert_allclose(found, points[1, k], atol=3.0 * step)
     page.choose("view", "all")
 
 

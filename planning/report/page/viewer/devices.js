@@ -2,14 +2,23 @@
 
 import * as THREE from "three";
 
+import { lensOf, straight } from "./lens.js";
+
 const COLOURS = { projector: 0xd95f02, camera: 0x1f78c8 };
 const ZONES = { room: 0x80808c, "mounting plane": 0x2e844a, "keep out": 0xb22234 };
 const ROUND = 64;
 
 export const matrix = (rows) => new THREE.Matrix4().set(...rows.flat());
 
-// Corners of the image at depth 1 (diverging), or of the panel (parallel).
-export function imageCorners(device) {
+// Where the image's corners look: at depth 1 (diverging), or places on the panel.
+function imageCorners(device) {
+  const lens = lensOf(device);
+  if (!lens) return panelCorners(device);
+  return panelCorners(device).map(({ x, y }) => new THREE.Vector3(...straight(lens, [x, y]), 1));
+}
+
+// Corners of the panel at depth 1 (diverging), or as they are (parallel).
+export function panelCorners(device) {
   const [wide, high] = device.resolution;
   const pixels = [[-0.5, -0.5], [wide - 0.5, -0.5], [wide - 0.5, high - 0.5], [-0.5, high - 0.5]];
   if (device.K) {
@@ -23,7 +32,7 @@ export function imageCorners(device) {
 }
 
 // A corner of the image carried along the light to a depth.
-export function atDepth(device, corner, depth) {
+function atDepth(device, corner, depth) {
   if (device.K) return corner.clone().multiplyScalar(depth);
   return new THREE.Vector3(corner.x, corner.y, depth);
 }

@@ -2,10 +2,11 @@
 
 import * as THREE from "three";
 
-import { Devices, zonesAndObstacles } from "./devices.js";
-import { byId, element } from "./dom.js";
+import { Devices, matrix, panelCorners, zonesAndObstacles } from "./devices.js";
+import { byId, element, theme } from "./dom.js";
 import { Eye } from "./eyes.js";
 import { Layers } from "./layers.js";
+import { bends, lookThrough } from "./lens.js";
 import { dots, Measure } from "./measure.js";
 import { Panel } from "./panel.js";
 import { meshOf, unpack } from "./payload.js";
@@ -13,7 +14,6 @@ import { Picking } from "./picking.js";
 import { Sequence } from "./sequence.js";
 import { Stage } from "./stage.js";
 import { Surface } from "./surface.js";
-import { theme } from "./theme.js";
 
 // Smooth edges cost a software renderer five times as long; finer meshes need them less.
 const SMOOTH = 300000;
@@ -26,7 +26,7 @@ async function start() {
   Surface.LIT = facts.causes.light.length;
   const surface = new Surface(meshOf(arrays, "mesh"), facts.mesh, projectors, arrays.get("light"));
   const up = new THREE.Vector3(...facts.up);
-  const stage = new Stage(byId("canvas"), surface.count < SMOOTH, objectCentre(facts), up, [...objectPlaces(facts), ...devicePlaces(facts)]);
+  const stage = new Stage(byId("canvas"), surface.count < SMOOTH, objectCentre(facts), up, [...objectPlaces(facts), ...devicePlaces(facts), ...panelPlaces(facts)]);
   stage.scene.add(surface.mesh);
   const devices = new Devices(stage, facts, byId("labels"));
   const { zones, obstacles } = zonesAndObstacles(facts, (name) => meshOf(arrays, name));
@@ -40,6 +40,12 @@ async function start() {
   const mark = dots(new THREE.BufferGeometry());
   mark.frustumCulled = false;
   stage.scene.add(mark);
+
+  stage.scene.traverse((thing) => {
+    // A lens may bend into the picture what lies beside it.
+    thing.frustumCulled = false;
+    if (thing.material && !thing.material.isShaderMaterial) bends(thing.material);
+  });
 
   const isOn = (name) => byId(`show-${name}`)?.checked ?? false;
   const rings = projectors.map((p) => check("rings-of", `rings-${p.id}`, p.id, false));
@@ -79,6 +85,7 @@ async function start() {
     const chosen = byId("view").value;
     stage.eye = eyes.find((eye) => eye.device.id === chosen) ?? null;
     stage.eye?.zoom(1e-9);
+    lookThrough(stage.eye?.lens ?? null);
     const turned = { all: {}, object: { places: objectPlaces(facts) } }[chosen];
     const flat = { top: [-Math.PI / 2, 1.57], front: [-Math.PI / 2, 0], side: [0, 0] }[chosen];
     if (turned) stage.frame({ turn: facingDevices(stage, facts), ...turned });
@@ -118,7 +125,7 @@ async function start() {
     const hit = picking.at(x, y);
     if (hit) choose(hit.face, hit.point);
   };
-  theme((colour) => stage.setBackground(colour));
+  theme((colour, beside) => stage.setBackground(colour, beside));
   sequence.go(-1);
   layers.show();
   look();
@@ -145,6 +152,10 @@ function check(into, id, words, checked) {
 
 const objectCentre = ({ mesh }) => new THREE.Vector3(...mesh.low.map((low, k) => low + 0.5 * mesh.side[k]));
 const devicePlaces = ({ devices }) => devices.map(({ pose }) => new THREE.Vector3(...pose.slice(0, 3).map((row) => row[3])));
+
+// Corners of panels in parallel light, which are as large as their beams.
+const panelPlaces = ({ devices }) =>
+  devices.filter(({ K }) => !K).flatMap((device) => panelCorners(device).map((c) => c.applyMatrix4(matrix(device.pose))));
 
 // Corners of the object's box.
 function objectPlaces({ mesh }) {

@@ -16,7 +16,7 @@ export class Picking {
     const view = stage.window;
     const ndc = [(2 * (x - view.left)) / view.wide - 1, 1 - (2 * (y - view.top)) / view.high];
     if (Math.max(...ndc.map(Math.abs)) > 1) return null;
-    const ray = rayThrough(stage.camera, ndc);
+    const ray = rayThrough(stage, ndc);
     const face = this.number(ndc, view);
     if (face < 0) return null;
     const [a] = surface.triangle(face);
@@ -54,11 +54,12 @@ export class Picking {
   }
 }
 
-function rayThrough(camera, [x, y]) {
+function rayThrough({ camera, eye }, [x, y]) {
   camera.updateMatrixWorld();
   const unproject = new THREE.Matrix4().copy(camera.projectionMatrix).invert();
   const [near, far] = [-1, 0.5].map((z) =>
-    new THREE.Vector3(x, y, z).applyMatrix4(unproject).applyMatrix4(camera.matrixWorld),
+    (eye ? eye.unproject(x, y, z) : new THREE.Vector3(x, y, z).applyMatrix4(unproject))
+      .applyMatrix4(camera.matrixWorld),
   );
   return new THREE.Ray(near, far.sub(near).normalize());
 }

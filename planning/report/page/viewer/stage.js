@@ -147,8 +147,10 @@ export class Stage {
     event.preventDefault();
   }
 
-  setBackground(colour) {
+  // Of the picture, and of what lies beside a device's image.
+  setBackground(colour, beside) {
     this.background = new THREE.Color(colour);
+    this.beside = new THREE.Color(beside);
     this.restoreClear();
     this.redraw();
   }
@@ -187,7 +189,9 @@ export class Stage {
     this.free.updateProjectionMatrix();
     this.renderer.setScissorTest(false);
     this.renderer.setViewport(0, 0, wide, high);
+    if (this.beside) this.renderer.setClearColor(this.beside, 1);
     this.renderer.clear();
+    this.restoreClear();
     this.renderer.setScissorTest(true);
     const from = high - view.top - view.high;
     this.renderer.setScissor(view.left, from, view.wide, view.high);
@@ -198,7 +202,7 @@ export class Stage {
 
   // A point of the world on the canvas in pixels; null behind the camera.
   spot(point) {
-    const at = point.clone().project(this.camera);
+    const at = this.eye ? this.eye.project(point) : point.clone().project(this.camera);
     if (at.z > 1 || at.z < -1) return null;
     const view = this.window;
     return [view.left + (0.5 + 0.5 * at.x) * view.wide, view.top + (0.5 - 0.5 * at.y) * view.high];

@@ -4,9 +4,12 @@
 
 import * as THREE from "three";
 
+import { LENS } from "./lens.js";
+
 const WIDTH = 4096;
 
 const VERTEX = `
+${LENS.words}
 out vec3 vWorld;
 out vec3 vView;
 flat out int vFace;
@@ -16,7 +19,7 @@ void main() {
   vec4 view = viewMatrix * world;
   vWorld = world.xyz;
   vView = view.xyz;
-  gl_Position = projectionMatrix * view;
+  gl_Position = projectionMatrix * bent(view);
 }`;
 
 // A ring is where c, rho / z or rho in the ring frame, is one of the radii.
@@ -142,13 +145,14 @@ export class Surface {
       },
       chosen: { value: -1 },
       ringsOn: { value: 0 },
+      ...LENS.uniforms,
       ...ringUniforms(projectors),
     };
     const common = { vertexShader: VERTEX, glslVersion: THREE.GLSL3, side: THREE.DoubleSide };
     this.material = new THREE.ShaderMaterial({
       ...common, defines, uniforms: this.uniforms, fragmentShader: FRAGMENT,
     });
-    this.numbers = new THREE.ShaderMaterial({ ...common, fragmentShader: NUMBERS });
+    this.numbers = new THREE.ShaderMaterial({ ...common, uniforms: LENS.uniforms, fragmentShader: NUMBERS });
     this.mesh = new THREE.Mesh(geometry, this.material);
     this.mesh.matrixAutoUpdate = false;
     this.mesh.matrix.makeScale(...box.side).setPosition(...box.low);

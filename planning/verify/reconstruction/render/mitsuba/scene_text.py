@@ -137,13 +137,15 @@ def _light(scanner: Scanner, shine: Shine) -> list[str]:
         _value("boolean", "raw", "true"),
         _value("string", "filter_type", "nearest"),
         _value("string", "wrap_mode", "clamp"),
-        id="shown",
+        name="irradiance",
     )
-    return [image] + [
+    # Each light has the image as its own: Mitsuba 3.6 loads a scene by several threads,
+    # and crashes where many refer to one.
+    return [
         _tag(
             "emitter",
             "projector",
-            '<ref name="irradiance" id="shown"/>',
+            image,
             _value("float", "fov", float(np.rad2deg(2.0 * np.arctan(half)))),
             _value("float", "scale", depth**2 / len(shine.pupil)),
             _pose(world_from_light(projector, point, scanner.projector_focus)),
@@ -272,7 +274,7 @@ def _value(kind: str, name: str, value: object) -> str:
     return f'<{kind} name="{name}" value="{value}"/>'
 
 
-def _tag(element: str, kind: str, *parts: str, id: str = "") -> str:
-    name = f' id="{id}"' if id else ""
+def _tag(element: str, kind: str, *parts: str, **names: str) -> str:
+    name = "".join(f' {key}="{value}"' for key, value in names.items())
     inside = "".join(f"\n  {line}" for part in parts for line in part.splitlines())
     return f'<{element} type="{kind}"{name}>{inside}\n</{element}>'
