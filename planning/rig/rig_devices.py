@@ -15,7 +15,7 @@ from planning.model.light.light_budget import LightBudget
 from planning.model.planned import EDGE_VARIANCE, edge_linearity_px
 
 from . import optics
-from .rig_tables import ParallelTable, PinholeTable, RigTable
+from .rig_tables import ParallelTable, PinholeTable, ProjectorTable, RigTable
 
 # Projectors of the shortest throw look 60 degrees or so off their axes.
 _FARTHEST_OFF = math.radians(75.0)
@@ -30,6 +30,8 @@ _UNSAID = "stated in the rig file, without a source"
 def pinhole_device(table: PinholeTable, role: str) -> PinholeModel:
     """Return the model of a camera or a diverging projector, `role` in messages.
 
+    A projector's lens is taken as straight: rings are drawn as if it were.
+
     Raises:
         RigError: If no distance is sharp, or sharpness has no far end.
     """
@@ -40,7 +42,8 @@ def pinhole_device(table: PinholeTable, role: str) -> PinholeModel:
     else:
         cx = 0.5 * (width - 1)
         cy = optics.principal_row(height, table.vertical_offset_percent or 0.0)
-    k1, k2, p1, p2, k3 = table.distortion
+    straight = isinstance(table, ProjectorTable)
+    k1, k2, p1, p2, k3 = [0.0] * 5 if straight else table.distortion
     camera_matrix = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
     camera_matrix.setflags(write=False)
     off = math.atan(
@@ -238,7 +241,13 @@ def device_document(
 
 
 def device_notes(role: str, table: PinholeTable | ParallelTable) -> Iterator[str]:
-    """Yield what a user of a device of the catalogue should know, a sentence each."""
+    """Yield what a user of a device should know, a sentence each."""
+    if isinstance(table, ProjectorTable) and any(table.distortion):
+        yield (
+            f"{role}: its distortion moves rings by up to {_bent_px(table, role):.1f} "
+            f"px at the corners and isn't counted: rings are planned, drawn and "
+            f"checked as if it had none; bend the pattern files by it"
+        )
     if table.device is None:
         return
     # How it is focused is the user's own choice.
@@ -257,6 +266,17 @@ def device_notes(role: str, table: PinholeTable | ParallelTable) -> Iterator[str
             f"{role} {table.device}: without [{role}.focus] every distance from "
             f"{(table.range_mm or [0.0])[0]:g} mm on counts as sharp"
         )
+
+
+def _bent_px(table: ProjectorTable, role: str) -> float:
+    """How far distortion moves the corners of an image at most [px]."""
+    device = pinhole_device(table, role)
+    k1, k2, p1, p2, k3 = table.distortion
+    width, height = device.resolution
+    corners = np.array([[x, y] for x in (0, width - 1) for y in (0, height - 1)])
+    bent = replace(device, distortion=(k1, k2, p1, p2, k3))
+    moved = bent.project(device.rays(corners.astype(np.float64))) - corners
+    return float(np.linalg.norm(moved, axis=1).max())
 
 
 def _focal_px(table: PinholeTable) -> tuple[float, float]:

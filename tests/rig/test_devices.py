@@ -222,3 +222,15 @@ def test_every_preset_validates_against_the_schema_and_faults_do_not():
         {"camera": {"focal_mm": "12"}},
     ):
         assert not schema.is_valid({"base": "default"} | bad)
+
+
+def test_distortion_of_a_projector_is_told_in_pixels_and_not_planned_with():
+    """At the corner, r = |(x, y)| of the ray: k1 r^3 f pixels outwards."""
+    lens = {"name": "p", "resolution_px": [1000, 1000], "focal_px": [1000.0, 1000.0]}
+    bent = lens | {"range_mm": [500.0, 2000.0], "distortion": [0.01, 0, 0, 0, 0]}
+    rig = load_rig({"base": "default", "projector": bent})
+    assert rig.projector_device().distortion == (0.0,) * 5
+    (note,) = (note for note in rig.notes() if "distortion" in note)
+    r = math.sqrt(2.0) * 499.5 / 1000.0
+    assert f"up to {0.01 * r**3 * 1000.0:.1f} px" in note
+    assert not any("distortion" in note for note in load_rig().notes())

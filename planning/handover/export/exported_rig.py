@@ -228,7 +228,7 @@ class ExportedRig:
     @property
     def lacks(self) -> list[str]:
         """Return a sentence where the plan itself lacks what its rig file says."""
-        terms = self.plan.document.rig.projector.distortion
+        terms = self.plan.document.rig.projector.figures.distortion
         new = [
             each
             for each in self.devices

@@ -48,8 +48,8 @@ class MountTables:
         "`axis` is where the optical axis is at the standoff to the object's "
         "centre. to_D1_mm ...: from either point to the datum points, which are the "
         "corners of the object's bounding box on the floor (or its lowest face). "
-        "poses.csv: optical centres and quaternions (device to frame, OpenCV axes) "
-        "with all digits, as `plan evaluate --poses` reads it. optics.csv: pixels; "
+        "Of several models a last column says which one. poses.csv: optical centres "
+        "and quaternions (device to frame, OpenCV axes) with all digits, as `plan evaluate --poses` reads it. optics.csv: pixels; "
         "the centre of the top-left one is (0, 0). Lines that begin with # are "
         "comments."
     )
@@ -71,11 +71,24 @@ class MountTables:
                 for k, point in enumerate(rig.datums, 1)
             ),
         ]
-        frame = [f"frame: {rig.frame.words}"]
+        frame, devices = [f"frame: {rig.frame.words}"], rig.devices
+        models = [[device.planned.model] for device in devices]
+        if not any(map(any, models)):
+            models = [[] for _ in devices]
         return {
-            "mounts.csv": _table(notes, _MOUNTS, (_mount(d, rig) for d in rig.devices)),
-            "poses.csv": _table(frame, _POSES, map(_pose, rig.devices)),
-            "optics.csv": _table([], _OPTICS, map(_optics, rig.devices)),
+            name: _table(
+                told,
+                (*head, *["model"] * bool(models and models[0])),
+                (
+                    [*row(device), *model]
+                    for device, model in zip(devices, models, strict=True)
+                ),
+            )
+            for name, told, head, row in (
+                ("mounts.csv", notes, _MOUNTS, lambda device: _mount(device, rig)),
+                ("poses.csv", frame, _POSES, _pose),
+                ("optics.csv", [], _OPTICS, _optics),
+            )
         }
 
 

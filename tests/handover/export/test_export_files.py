@@ -82,7 +82,8 @@ def pose_of(quaternion_wxyz, translation):
 
 def test_distortion_of_projectors_that_the_plan_lost_is_told(tmp_path):
     def bent(document):
-        document["rig"]["projector"]["distortion"] = [-0.03, 0.01, 0.0, 0.0, 0.0]
+        figures = document["rig"]["projector"].setdefault("figures", {})
+        figures["distortion"] = [-0.03, 0.01, 0.0, 0.0, 0.0]
 
     plan = changed(exported_plan(), bent)
     bare = ExportedRig.of(plan, frame_of(None, plan.requirements.workspace))
