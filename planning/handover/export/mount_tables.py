@@ -49,7 +49,8 @@ class MountTables:
         "centre. to_D1_mm ...: from either point to the datum points, which are the "
         "corners of the object's bounding box on the floor (or its lowest face). "
         "Of several models a last column says which one. poses.csv: optical centres "
-        "and quaternions (device to frame, OpenCV axes) with all digits, as `plan evaluate --poses` reads it. optics.csv: pixels; "
+        "and quaternions (device to frame, OpenCV axes) with all digits, as `plan "
+        "evaluate --poses` reads it. optics.csv: pixels; "
         "the centre of the top-left one is (0, 0). Lines that begin with # are "
         "comments."
     )
@@ -71,24 +72,22 @@ class MountTables:
                 for k, point in enumerate(rig.datums, 1)
             ),
         ]
-        frame, devices = [f"frame: {rig.frame.words}"], rig.devices
-        models = [[device.planned.model] for device in devices]
-        if not any(map(any, models)):
-            models = [[] for _ in devices]
+        devices, frame = rig.devices, [f"frame: {rig.frame.words}"]
+        several = any(device.planned.model for device in devices)
+
+        def table(
+            told: Sequence[str], head: Sequence[str], rows: Iterable[list[str]]
+        ) -> Content:
+            if several:
+                head = (*head, "model")
+                models = [device.planned.model for device in devices]
+                rows = ([*row, of] for row, of in zip(rows, models, strict=True))
+            return _table(told, head, rows)
+
         return {
-            name: _table(
-                told,
-                (*head, *["model"] * bool(models and models[0])),
-                (
-                    [*row(device), *model]
-                    for device, model in zip(devices, models, strict=True)
-                ),
-            )
-            for name, told, head, row in (
-                ("mounts.csv", notes, _MOUNTS, lambda device: _mount(device, rig)),
-                ("poses.csv", frame, _POSES, _pose),
-                ("optics.csv", [], _OPTICS, _optics),
-            )
+            "mounts.csv": table(notes, _MOUNTS, (_mount(d, rig) for d in devices)),
+            "poses.csv": table(frame, _POSES, map(_pose, devices)),
+            "optics.csv": table([], _OPTICS, map(_optics, devices)),
         }
 
 

@@ -127,7 +127,11 @@ def _devices(plan: RigPlan, room: int) -> list[str]:
     ]
     for device, (x, y, z, *housing, azimuth, elevation, distance) in told:
         pan, tilt, roll = np.round(housing, 1) + 0.0
-        kept = f"  existing: {device.existing}" if device.existing else ""
+        kept = (
+            f"  existing: {device.existing}"
+            if device.existing not in ("", device.id)
+            else ""
+        )
         lines.append(
             f"{device.id:<4} {x:9.1f} {y:9.1f} {z:9.1f}  {pan:9.1f} {tilt:7.1f} "
             f"{roll:7.1f}   {azimuth:11.1f} {elevation:11.1f}   {distance:8.1f}{kept}"
