@@ -20,7 +20,7 @@ from planning.report.live_bar import shown
 from planning.report.partial_plan import PartialPlan, PlanRequest
 from planning.report.summary.shortfall import shortfalls
 from planning.report.tolerance.robust import robustly
-from planning.rig.lens_fit import check_fields
+from planning.rig.devices.lens_fit import check_fields
 from planning.rig.mounted import Mounted
 from planning.rig.rig import Rig
 from planning.rig.wishes import AccuracyOf, TargetName, Wishes

@@ -17,7 +17,8 @@ import numpy as np
 
 from solvers import CoverProblem
 from solvers.covers.bounds.mixed_integer import linear_multipliers
-from solvers.covers.bounds.reductions import ReducedCover, reduce_problem
+from solvers.covers.bounds.reduced_cover import ReducedCover
+from solvers.covers.bounds.reductions import reduce_problem
 from solvers.status import WorkBudget
 
 N_SAMPLES, N_CANDIDATES = 2_000, 500

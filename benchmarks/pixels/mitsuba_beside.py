@@ -29,7 +29,7 @@ from geometry.mesh.sampling import sample_surface
 from geometry.shapes.sample_head.sample_head import sample_head
 from planning.verify.reconstruction.check.accuracy import Expected, nearest_distance
 from planning.verify.reconstruction.check.result import Reconstruction
-from planning.verify.reconstruction.defocus import Defocus
+from planning.verify.reconstruction.patterns.defocus import Defocus
 from planning.verify.reconstruction.reconstruct import reconstruct
 from planning.verify.reconstruction.render.mitsuba.materials import Surface
 from planning.verify.reconstruction.render.mitsuba.physics import Physics

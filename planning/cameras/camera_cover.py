@@ -26,7 +26,6 @@ from planning.scene.measured import (
 from planning.scene.placed_bodies import existing_devices
 from planning.scene.samples import Target, merged
 from planning.scene.scene import Scene
-from planning.scene.workspace.model_candidates import ModelCandidates
 
 _ROUNDS = 3
 
@@ -86,7 +85,7 @@ def camera_candidate_views(
 
     So many of each model.
     """
-    offer = ModelCandidates.over_scene(scene, templates)
+    offer = scene.candidates(templates)
     every = n_candidates * len(templates)
     free = candidates_with_clearance(scene, every, offer.over)
     standing = existing_devices(scene.requirements, templates)

@@ -21,7 +21,7 @@ from planning.scene.draws import DRAWS
 from planning.scene.measured import lit_samples
 from planning.scene.placed_bodies import blocked_by, bodies_of, moves_bodies
 from planning.scene.scene import Scene
-from planning.scene.workspace.model_candidates import ModelCandidates, one_of_each
+from planning.scene.workspace.model_candidates import one_of_each
 
 from .camera_bodies import lit_among
 from .camera_cover import n_fixed
@@ -78,7 +78,7 @@ def surer_cameras(
     target = scene.target_samples(DRAWS.surer)
     samples = lit_samples(scene, projectors, target)
     models = one_of_each(stage.cover.candidates.cameras)
-    offer = ModelCandidates.over_scene(scene, models)
+    offer = scene.candidates(models)
     near = with_clearance(scene, offer.nearest(n_candidates * len(models)))
     candidates = stage.cover.candidates.joined((*near, *cameras))
     views = candidates.on(samples.target)

@@ -36,7 +36,7 @@ class CandidateSource:
 
     @cached_property
     def _offer(self) -> ModelCandidates[PlannedProjector]:
-        return ModelCandidates.over_scene(self.scene, self.templates)
+        return self.scene.candidates(self.templates)
 
     def lattice(self, n: int) -> tuple[PlannedProjector, ...]:
         """Return existing projectors, and at least n of each model anywhere."""

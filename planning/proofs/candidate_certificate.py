@@ -17,7 +17,8 @@ from planning.model.document.certificates import (
 )
 
 from .conflicts import Interference, resolve_others
-from .selection import CandidateCover, Selection, marginals
+from .marginals import marginals
+from .selection import CandidateCover, Selection
 
 _ByCount = Mapping[int, NDArray[np.int64]]
 # What a certificate says where chosen devices have bodies.

@@ -22,8 +22,9 @@ from planning.scene.placed_bodies import (
 )
 from solvers.covers.cover import solve_max_coverage
 
+from .marginals import MORE, Marginals
 from .quotas import Quotas
-from .selection import MORE, CandidateCover, Marginals, Selection, cover_problem
+from .selection import CandidateCover, Selection, cover_problem
 
 # Counted work of each completion, of which no proof is asked.
 _BUDGET = 1e8

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from solvers import CoverProblem, solve_cover
 from solvers.bit_rows import sparse_rows
-from solvers.covers.bounds.reductions import ReducedCover
+from solvers.covers.bounds.reduced_cover import ReducedCover
 from solvers.covers.cover import (
     DEFAULT_BUDGET,
     MaxCoverageSolution,
@@ -24,10 +24,6 @@ from solvers.covers.cover import (
 from .device_stock import DeviceStock
 from .quotas import Quotas, RegionFloors
 
-# Counts beyond the one taken for which the best candidates are reported.
-MORE = 2
-# Counted work for the marginal table's other counts, where no proof is claimed.
-_MARGINAL_BUDGET = 3e8
 # Standard errors above the floors of regions at which selections aim.
 _AIMED = 1.0
 
@@ -67,22 +63,6 @@ class Selection:
     def needed(self) -> int:
         """Candidates of the smallest cover found, allowed or not."""
         return len(self.smallest)
-
-
-@dataclass(frozen=True, eq=False)
-class Marginals:
-    """What other numbers of candidates than the one taken would give.
-
-    Attributes:
-        by_count: Best candidates found for 1, 2, ... k + 2 devices.
-        n_covered: Samples that these cover, and the proven most that as many
-            candidates cover.
-        greedy: Candidates that the greedy cover takes.
-    """
-
-    by_count: dict[int, NDArray[np.int64]]
-    n_covered: dict[int, tuple[int, int]]
-    greedy: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -275,32 +255,6 @@ def fewest_count(cover: CandidateCover) -> int:
     return len(solve_cover(cover.problem, seed=cover.seed, heaviest=False).selected)
 
 
-def marginals(cover: CandidateCover, selection: Selection) -> Marginals:
-    """Return the best candidates for every other count, for the table in the plan."""
-    taken = len(selection.chosen)
-    by_count: dict[int, NDArray[np.int64]] = {}
-    n_covered: dict[int, tuple[int, int]] = {}
-    best = np.empty(0, dtype=np.int64)
-    most = min(taken + MORE, cover.covers.shape[1])
-    most = most if cover.stock is None else min(most, cover.stock.total)
-    for count in range(max(1, cover.n_existing), most + 1):
-        if count == taken:
-            best = selection.chosen
-            n_covered[count] = selection.n_covered, selection.n_covered_bound
-        else:
-            best, bound = cover.most_covering(
-                count,
-                selection.smallest if count == selection.needed else best,
-                DEFAULT_BUDGET if count == taken - 1 else _MARGINAL_BUDGET,
-            )
-            if count < selection.total_bound:
-                # Where so many are proved too few, they fall short of the requirement.
-                bound = min(bound, selection.required - 1)
-            n_covered[count] = cover.n_covered(best), bound
-        by_count[count] = best
-    return Marginals(by_count, n_covered, _greedy_count(cover))
-
-
 def cover_problem(
     covers: NDArray[np.bool_],
     required: int | Quotas,
@@ -332,26 +286,3 @@ def cover_problem(
         )
     total = required.total if isinstance(required, Quotas) else required
     return CoverProblem(rows, required_weight=np.array([total]), **taken)
-
-
-def _greedy_count(cover: CandidateCover) -> int:
-    """How many candidates it takes when each adds most samples, lower index first.
-
-    Of samples that are lacking: of any while the total is, then of regions' alone.
-    """
-    covers, count = cover.covers, cover.n_existing
-    uncovered = ~np.any(covers[:, :count], axis=1)
-    left = None if cover.stock is None else cover.stock.left(np.arange(count))
-    while not cover.quotas.enough(~uncovered):
-        wanted = uncovered & cover.quotas.wanted(~uncovered)
-        gains = covers[wanted].sum(axis=0)
-        if cover.stock is not None and left is not None:
-            gains[left[cover.stock.kinds] <= 0] = 0
-        best = int(np.argmax(gains))
-        if not gains[best] > 0:
-            break
-        if cover.stock is not None and left is not None:
-            left[cover.stock.kinds[best]] -= 1
-        uncovered &= ~covers[:, best]
-        count += 1
-    return count

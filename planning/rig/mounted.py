@@ -24,8 +24,8 @@ from planning.model.table_types import fault_words
 from planning.scene.placed_bodies import Device, kind_of
 from planning.scene.ranges.csv_rows import CsvRow, read_csv
 
+from .devices.models import Model
 from .existing_tables import ExistingTable
-from .models import Model
 from .rig import Rig
 from .rig_tables import check_names
 

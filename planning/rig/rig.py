@@ -7,40 +7,36 @@ devices in pixels, metres and radians and the requirements that a plan is held t
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import product
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.devices import ParallelModel, PinholeModel
 from geometry.mesh.mesh import TriangleMesh
-from planning.model.bodies import Mount
 from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.model.obstacles import Obstacle
 from planning.model.requirements import Requirements, Workspace
 from planning.scene.lights import light_of
 
-from .existing_devices import build_existing, check_existing
-from .lens_fit import LensFit, unsharp
-from .models import Model, models_of, most_of, stock_of
-from .object_size import ObjectSize
-from .obstacle_tables import obstacles_of
-from .rig_devices import (
+from .devices.edge_optics import edge_notes
+from .devices.existing_devices import build_existing, check_existing
+from .devices.lens_fit import LensFit, unsharp
+from .devices.models import Model, most_of, stock_of
+from .devices.rig_devices import (
     device_document,
     device_notes,
     drawn_edges,
-    edge_notes,
     light_budget,
 )
+from .devices.rig_models import Light, RigDevices, pinhole_of
+from .object_size import ObjectSize
+from .obstacle_tables import obstacles_of
 from .rig_requirements import build_requirements, build_workspace, limit_notes
-from .rig_tables import MountingTable, ParallelTable, PinholeTable, RigTable, RingsTable
+from .rig_tables import MountingTable, RingsTable
 from .toml.rig_files import changed, read_rig, rig_folder
 from .wishes import Wishes
-
-Light = Literal["diverging", "parallel"]
 
 
 def load_rig(
@@ -67,16 +63,12 @@ def load_rig(
 
 
 @dataclass(frozen=True, eq=False)
-class Rig:
+class Rig(RigDevices):
     """Devices, placement and limits of one rig, in metres and radians.
 
     The table is as written, in millimetres and degrees; files that it names are looked
     for in the folder.
     """
-
-    table: RigTable
-    light: Light
-    folder: Path = Path()
 
     def replace(self, **tables: Any) -> "Rig":  # noqa: ANN401 - as a file has them
         """Return a rig with tables laid over it: ``placement={"standoff_mm": 900}``.
@@ -87,11 +79,6 @@ class Rig:
         rig = replace(self, table=changed(self.table, tables))
         _check_devices(rig)
         return rig
-
-    @property
-    def name(self) -> str:
-        """Name of the rig."""
-        return self.table.name
 
     @property
     def standoff_m(self) -> float:
@@ -133,50 +120,6 @@ class Rig:
         placement = self.table.placement
         return max(placement.n_candidate_cameras, placement.n_reference_cameras)
 
-    @cached_property
-    def projector_models(self) -> tuple[Model, ...]:
-        """The models of projectors of this light, the first one first.
-
-        Raises:
-            RigError: If the rig has no projector for this light, or a list is none.
-        """
-        key = self.projector_key
-        return models_of(self.table, key, self._projector_table)
-
-    @cached_property
-    def camera_models(self) -> tuple[Model, ...]:
-        """The models of cameras, the first one first.
-
-        Raises:
-            RigError: As of projectors.
-        """
-        return models_of(self.table, "camera", self.table.camera)
-
-    def models(self, kind: str) -> tuple[Model, ...]:
-        """Return the models of a `projector` or a `camera`."""
-        return self.projector_models if kind == "projector" else self.camera_models
-
-    def projector_device(self) -> PinholeModel | ParallelModel:
-        """Return the optics of the first model of projectors."""
-        return self.projector_models[0].device
-
-    def camera_device(self) -> PinholeModel:
-        """Return the optics of the first model of cameras."""
-        return _pinhole(self.camera_models[0])
-
-    @property
-    def optics(
-        self,
-    ) -> tuple[tuple[PinholeModel | ParallelModel, ...], tuple[PinholeModel, ...]]:
-        """Optics of all models of projectors, and of cameras."""
-        lit = tuple(model.device for model in self.projector_models)
-        return lit, tuple(_pinhole(model) for model in self.camera_models)
-
-    def mounts(self) -> dict[str, Mount | None]:
-        """Return `projector_mount` and `camera_mount` of `Workspace`."""
-        tables = {"projector": self._projector_table, "camera": self.table.camera}
-        return {f"{kind}_mount": Mount.of(each.mount) for kind, each in tables.items()}
-
     def fit(self, model: Model, size: ObjectSize) -> LensFit:
         """Return how a model suits an object, see `LensFit`."""
         role = model.role.replace(self.projector_key, "projector")
@@ -186,7 +129,10 @@ class Rig:
     def fits(self, mesh: TriangleMesh) -> tuple[LensFit, ...]:
         """Return how cameras and projectors suit an object."""
         size = ObjectSize.of(mesh)
-        return tuple(self.fit(model, size) for model in self._all_models)
+        return tuple(
+            self.fit(model, size)
+            for model in (*self.camera_models, *self.projector_models)
+        )
 
     def outer_ring_radius(self) -> float:
         """Return the outermost ring, wherever the ring axis is turned or shifted to."""
@@ -201,7 +147,7 @@ class Rig:
         notes = [n for m in (*lamps, *eyes) for n in device_notes(m.role, m.table)]
         for lamp, eye in product(lamps, eyes):
             drawn = drawn_edges(lamp.table, lamp.device)
-            notes += edge_notes(drawn, lamp.device, _pinhole(eye), self.standoff_m)
+            notes += edge_notes(drawn, lamp.device, pinhole_of(eye), self.standoff_m)
         return (*limit_notes(self.table.limits), *notes)
 
     def requirements(
@@ -243,8 +189,8 @@ class Rig:
             max_projectors=most_of(kinds["projector"], wishes.max_projectors),
             max_cameras=most_of(kinds["camera"], wishes.max_cameras),
         )
-        drawn = drawn_edges(self._projector_table, self.projector_device())
-        light = light_budget(self.table, self._projector_table, self.camera_device())
+        drawn = drawn_edges(self.projector_table, self.projector_device())
+        light = light_budget(self.table, self.projector_table, self.camera_device())
         required = build_requirements(
             self.table, wishes, workspace, tau_m=tau_m, drawn_edges=drawn, light=light
         )
@@ -317,35 +263,9 @@ class Rig:
             **listed,
         }
 
-    @property
-    def _all_models(self) -> tuple[Model, ...]:
-        return (*self.camera_models, *self.projector_models)
-
     def _document_of(self, model: Model) -> dict[str, Any]:
         lit = {"light": self.light} if model in self.projector_models else {}
         return {**device_document(model.table, model.device), **lit}
-
-    @property
-    def projector_key(self) -> str:
-        """Table of the projector of this light."""
-        return "projector" if self.light == "diverging" else "parallel_projector"
-
-    @property
-    def _projector_table(self) -> PinholeTable | ParallelTable:
-        """The projector of this light as written."""
-        key = self.projector_key
-        table = getattr(self.table, key)
-        if table is None:
-            raise RigError(
-                f"rig {self.name}: light '{self.light}' needs a table [{key}]; "
-                f'add it, or lay the file over one that has it: base = "default"'
-            )
-        return table
-
-
-def _pinhole(model: Model) -> PinholeModel:
-    assert isinstance(model.device, PinholeModel)
-    return model.device
 
 
 def _check_devices(rig: Rig) -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,10 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import sample_surface
 from geometry.rays.visibility import Visibility
 from geometry.repair.hollow import MeshShell, measure_shell
+from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Requirements, Workspace
+from planning.scene.workspace.candidates import Candidates
+from planning.scene.workspace.model_candidates import ModelCandidates
 from planning.scene.workspace.view_tiles import Site
 
 from .draws import DRAWS, Draw
@@ -24,8 +28,11 @@ from .placed_bodies import (
     PlacedBody,
     bodies_of,
     existing_bodies,
+    kind_of,
 )
 from .samples import Target, merged
+
+_D = TypeVar("_D", PlannedProjector, PlannedCamera)
 
 # Positions are written to 0.01 mm; twice the half diagonal of that cube.
 _ROUNDING_M = 2e-5
@@ -155,6 +162,22 @@ class Scene:
             return None
         samples = self.target_samples(DRAWS.site).samples
         return Site(device, space, radius, standoff, samples, limits.max_incidence)
+
+    def candidates(
+        self, templates: Iterable[_D], space: Workspace | None = None
+    ) -> ModelCandidates[_D]:
+        """Return what gives candidates over the object, of each template's model.
+
+        In its workspace, or another one.
+        """
+
+        def of(template: _D) -> Candidates[_D]:
+            site = self.site(kind_of(template), template.device)
+            if site is not None and space is not None:
+                site = replace(site, workspace=space)
+            return Candidates(template, space or self.requirements.workspace, site)
+
+        return ModelCandidates(tuple(of(template) for template in templates))
 
     def _samples(
         self, draw: Draw, within: NDArray[np.bool_] | None, *part: int

@@ -13,7 +13,7 @@ from solvers.covers.bounds.mixed_integer import (
     fits,
     linear_multipliers,
 )
-from solvers.covers.bounds.reductions import ReducedCover
+from solvers.covers.bounds.reduced_cover import ReducedCover
 from solvers.covers.bounds.relaxation import cost_bound
 from solvers.covers.search.neighbourhood import better, cheapest, greedy
 from solvers.status import SolveStatus, WorkBudget

@@ -12,7 +12,7 @@ import numpy as np
 
 from solvers.covers.bounds.lagrangian import tighten
 from solvers.covers.bounds.mixed_integer import branch_and_bound, fits
-from solvers.covers.bounds.reductions import ReducedCover
+from solvers.covers.bounds.reduced_cover import ReducedCover
 from solvers.covers.bounds.relaxation import count_bound
 from solvers.covers.full.full_cover import fewest_full
 from solvers.covers.search.neighbourhood import (

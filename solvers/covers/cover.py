@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from solvers.checked_numbers import set_names, whole_number
-from solvers.covers.bounds.reductions import ReducedCover, forgiven, reduce_problem
+from solvers.covers.bounds.reduced_cover import ReducedCover
+from solvers.covers.bounds.reductions import forgiven, reduce_problem
 from solvers.covers.search.neighbourhood import greedy, prune
 from solvers.one_thread import on_one_thread
 from solvers.status import SolveStatus, WorkBudget

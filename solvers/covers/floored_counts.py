@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.covers.bounds.mixed_integer import branch_and_bound, fits
-from solvers.covers.bounds.reductions import ReducedCover
+from solvers.covers.bounds.reduced_cover import ReducedCover
 from solvers.covers.exact.group_branching import best_by_groups
 from solvers.covers.search.neighbourhood import better, greedy, prune
 from solvers.covers.search.prices import Prices, lack, least_shortage, tightest

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from solvers.covers.bounds.lagrangian import tighten
 from solvers.covers.bounds.mixed_integer import TOLERANCE, branch_and_bound, fits
-from solvers.covers.bounds.reductions import ReducedCover
+from solvers.covers.bounds.reduced_cover import ReducedCover
 from solvers.covers.bounds.relaxation import coverage_bounds, rounding
 from solvers.covers.exact.group_branching import best_by_groups
 from solvers.covers.exact.pairs import best_pair

@@ -14,7 +14,7 @@ import numpy as np
 
 from solvers.covers.bounds.lagrangian import tighten
 from solvers.covers.bounds.mixed_integer import branch_and_bound, fits
-from solvers.covers.bounds.reductions import ReducedCover
+from solvers.covers.bounds.reduced_cover import ReducedCover
 from solvers.covers.bounds.relaxation import coverage_bounds
 from solvers.covers.search.neighbourhood import better, prune
 from solvers.status import SolveStatus, WorkBudget

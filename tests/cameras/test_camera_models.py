@@ -19,7 +19,7 @@ from planning.proofs.device_stock import within_stock
 from planning.rig.rig import load_rig
 from planning.rings.ring_radii import uniform_radii
 from planning.scene.lights import ring_frame
-from planning.scene.workspace.model_candidates import ModelCandidates, one_of_each
+from planning.scene.workspace.model_candidates import one_of_each
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +57,7 @@ def taken(cover) -> dict[str, int]:
 
 def test_each_model_offers_as_many_poses(ball):
     scene, _, cameras = ball
-    offer = ModelCandidates.over_scene(scene, cameras)
+    offer = scene.candidates(cameras)
     found = offer.over(60)
     models = [camera.model for camera in found]
     assert models.count("wide") >= 30

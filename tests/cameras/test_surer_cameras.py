@@ -18,7 +18,6 @@ from planning.report.tolerance.drawn_rigs import deviations_of
 from planning.report.tolerance.tolerance import draw, question_of
 from planning.scene.camera_views import CandidateViews, camera_views
 from planning.scene.measured import lit_samples
-from planning.scene.workspace.model_candidates import ModelCandidates
 
 _OFF = CalibrationErrors(np.radians(0.02), 5e-5, 2e-4, 0.3)
 _SMALL = 1e-2
@@ -101,7 +100,7 @@ def test_cameras_are_added_until_the_aim_is_reached(plan, case):
     scene, projectors, cameras = case.scene, plan.projectors, plan.cameras[:1]
     before = _on_its_samples(case, projectors, cameras)
     alone = before.of_rigs([0], 0.95)
-    around = ModelCandidates.over_scene(scene, cameras).around(cameras, 40)[::3]
+    around = scene.candidates(cameras).around(cameras, 40)[::3]
     views = CandidateViews(scene.among(()), (*plan.cameras, *around))
     stage = SimpleNamespace(cover=SimpleNamespace(candidates=views))
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from planning.proofs.candidate_certificate import certified
+from planning.proofs.marginals import marginals
 from planning.proofs.quotas import RegionFloors
-from planning.proofs.selection import CandidateCover, marginals, select_fewest
+from planning.proofs.selection import CandidateCover, select_fewest
 
 
 def brute(covers, required, count):

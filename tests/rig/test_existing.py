@@ -20,7 +20,8 @@ from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import plan_projectors
 from planning.projectors.proved_projectors import prove_fewest
 from planning.proofs.all_poses import Effort
-from planning.proofs.selection import CandidateCover, marginals, select_fewest
+from planning.proofs.marginals import marginals
+from planning.proofs.selection import CandidateCover, select_fewest
 from planning.report.claims import make_claims
 from planning.report.judged import Devices
 from planning.report.summary.summary import summary

@@ -20,10 +20,10 @@ from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.model.light.drawn_edges import DrawnEdges
 from planning.pipeline import plan_rig
 from planning.rig import optics
-from planning.rig.lens_fit import check_fields
+from planning.rig.devices.edge_optics import farthest_off, straighter_focus
+from planning.rig.devices.lens_fit import check_fields
 from planning.rig.object_size import ObjectSize
 from planning.rig.rig import load_rig
-from planning.rig.rig_devices import farthest_off, straighter_focus
 
 BALL = 0.13
 

@@ -4,8 +4,8 @@ import pytest
 
 from planning.cli.devices.rigs_command import show_rig_command
 from planning.model.errors import RigError
+from planning.rig.devices.rig_devices import light_budget
 from planning.rig.rig import load_rig
-from planning.rig.rig_devices import light_budget
 
 TABLE = """
 base = "default"

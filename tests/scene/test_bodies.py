@@ -33,7 +33,8 @@ from planning.proofs.conflicts import (
     resolve_conflicts,
     resolve_others,
 )
-from planning.proofs.selection import CandidateCover, marginals, select_fewest
+from planning.proofs.marginals import marginals
+from planning.proofs.selection import CandidateCover, select_fewest
 from planning.report.drawing.figures import device_figures
 from planning.rig.wishes import Wishes
 from planning.scene import lighting, measurability

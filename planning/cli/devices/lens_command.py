@@ -9,9 +9,10 @@ from geometry.files.readers import load_mesh
 from planning.cli.console import print_json
 from planning.cli.lines.object_lines import size_lines
 from planning.model.words import percent
-from planning.rig.lens_fit import LensFit
+from planning.rig.devices.edge_optics import farthest_off, straighter_focus
+from planning.rig.devices.lens_fit import LensFit
+from planning.rig.devices.rig_devices import drawn_edges
 from planning.rig.rig import load_rig
-from planning.rig.rig_devices import drawn_edges, farthest_off, straighter_focus
 
 # Edges that lie off by more are worth another focus [px of the projector].
 STRAIGHT_PX = 0.02

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from geometry.mesh.mesh import TriangleMesh
 from planning.report.summary.summary import body_words
-from planning.rig.lens_fit import optics_notes
+from planning.rig.devices.lens_fit import optics_notes
 from planning.rig.rig import Rig
 
 

@@ -28,7 +28,7 @@ from planning.scene.limits.pair_limits import CAUSES, MEASURED
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.measured import LitSamples, lit_samples, taken
 from planning.scene.scene import Scene
-from planning.scene.workspace.model_candidates import ModelCandidates, one_of_each
+from planning.scene.workspace.model_candidates import one_of_each
 
 from .demands import Demands, demands
 from .least_changes import (
@@ -73,7 +73,7 @@ def out_of_reach(
     larger = larger_workspaces(required.workspace, "camera")
     for change, whole in larger if share.wanted > 0 or stepped else ():
         models = one_of_each(devices.reference_cameras)
-        there = ModelCandidates.over_scene(scene, models, whole)
+        there = scene.candidates(models, whole)
         anywhere = there.over(required.workspace.n_reference_cameras)
         changes[change] = int(measured_by_any(among, anywhere, unmeasured).sum())
     counts = np.bincount(asked.furthest[out], minlength=MEASURED)

@@ -21,7 +21,7 @@ from planning.scene.limits.projector_limits import LIT
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from planning.scene.workspace.candidates import Candidates
-from planning.scene.workspace.model_candidates import ModelCandidates, one_of_each
+from planning.scene.workspace.model_candidates import one_of_each
 from planning.scene.workspace.view_tiles import Site
 
 from .demands import light_demands
@@ -57,7 +57,7 @@ def reachability_relaxations(
         furthest = furthest_lit(rest, reference, dark)
         gained[f"{moved} out of the way"] = int((furthest == LIT).sum())
     for change, larger in larger_workspaces(workspace, "projector"):
-        there = ModelCandidates.over_scene(scene, one_of_each(reference), larger)
+        there = scene.candidates(one_of_each(reference), larger)
         tiled = workspace.projector_standoff_m is not None
         anywhere = there.over(
             workspace.n_reference_projectors if tiled else len(reference)

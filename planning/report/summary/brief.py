@@ -16,12 +16,11 @@ from planning.model.words import count_words, percent
 
 from .cause_words import causes_line
 from .check_lines import error_words, unchecked
-from .device_lines import axis_name, standing
+from .device_lines import axis_name, models_line, standing, used_up
 from .proof_lines import user_selection
 from .region_lines import worst_region
 from .robust_lines import robust_cost
 from .shortfall import Shortfall, missing
-from .stock_words import models_line, used_up
 from .summary import lost_in_field
 from .warning_lines import warnings
 

@@ -1,5 +1,6 @@
 """Where every device stands and how its housing is turned, as one mounts it."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import combinations
 
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from geometry.devices import turned_to
 from geometry.poses import horizontal_axes, pan_tilt_roll
 from geometry.shapes.boxes import box_gap
+from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.scene.placed_bodies import bodies_of
@@ -126,3 +128,23 @@ def axis_name(direction: Sequence[float] | NDArray[np.float64]) -> str:
     """Return the world axis that a direction is nearest to, with its sign."""
     index = int(np.argmax(np.abs(direction)))
     return f"{'-' if direction[index] < 0 else '+'}{_AXES[index]}"
+
+
+def used_up(document: PlanDocument, kind: str) -> str:
+    """Return which counted models of a `projector` or a `camera` none is left of.
+
+    Empty where some are, or there is one model.
+    """
+    stock = document.requirements.stock_of(kind)
+    taken = Counter(record.model for record in getattr(document, f"{kind}s"))
+    gone = [f"{model} ({n})" for model, n in stock.items() if taken[model] >= n]
+    return " and ".join(gone)
+
+
+def models_line(document: PlanDocument) -> str:
+    """Return which device is of which of several models; empty of one."""
+    of_models: dict[str, list[str]] = {}
+    for record in (*document.projectors, *document.cameras):
+        if record.model:
+            of_models.setdefault(record.model, []).append(record.id)
+    return "; ".join(f"{', '.join(ids)}: {of}" for of, ids in of_models.items())

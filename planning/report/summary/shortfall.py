@@ -14,8 +14,8 @@ from planning.scene.limits.pair_limits import MEASURED_LIMITS
 from planning.scene.limits.projector_limits import PROJECTOR_LIMITS
 
 from .cause_words import areas_line, causes_line, rounded_down
+from .device_lines import used_up
 from .region_lines import floor_shortfalls
-from .stock_words import used_up
 
 
 @dataclass(frozen=True)

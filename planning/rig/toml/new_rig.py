@@ -8,7 +8,8 @@ from typing import Any
 
 from geometry.devices import PinholeModel
 from planning.rig import optics
-from planning.rig.rig_devices import drawn_edges, finest_view_m, pinhole_device
+from planning.rig.devices.edge_optics import finest_view_m
+from planning.rig.devices.rig_devices import drawn_edges, pinhole_device
 from planning.rig.rig_tables import CameraTable, PinholeTable, ProjectorTable
 
 from .catalogue import FARTHEST_MM, LensEntry, device_table, split_camera

@@ -8,9 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.model.requirements import Workspace
-from planning.scene.placed_bodies import kind_of
-from planning.scene.scene import Scene
 
 from .candidates import Candidates
 
@@ -34,24 +31,6 @@ class ModelCandidates(Generic[_D]):
     """
 
     of_models: tuple[Candidates[_D], ...]
-
-    @classmethod
-    def over_scene(
-        cls, scene: Scene, templates: Iterable[_D], space: Workspace | None = None
-    ) -> "ModelCandidates[_D]":
-        """Return what gives candidates over a scene's object, like templates.
-
-        In the scene's workspace, or another one.
-        """
-        own = scene.requirements.workspace
-
-        def of(template: _D) -> Candidates[_D]:
-            site = scene.site(kind_of(template), template.device)
-            if site is not None and space is not None:
-                site = replace(site, workspace=space)
-            return Candidates(template, space or own, site)
-
-        return cls(tuple(of(template) for template in templates))
 
     def over(self, n: int) -> tuple[_D, ...]:
         """Return at least n candidates over the workspace, as many of each model.

@@ -19,8 +19,8 @@ from planning.verify.reconstruction.patterns.ring_patterns import (
 )
 
 from .arrays import Array, Mask
-from .defocus import Defocus
 from .light_laws import LIGHTS, LightLaw
+from .patterns.defocus import Defocus
 
 _UNDISTORT_STEPS = 60
 _UNDISTORT_TOLERANCE = 1e-13

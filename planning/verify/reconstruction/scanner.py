@@ -24,7 +24,7 @@ from .calibration import (
     calibrate_camera,
     calibrate_projector,
 )
-from .defocus import Defocus, defocus_of, model_of
+from .patterns.defocus import Defocus, defocus_of, model_of
 
 # Rings that run more steeply along the viewing ray cross steps between surfaces, unless
 # the plan counts on surface seen at such incidence [rad].

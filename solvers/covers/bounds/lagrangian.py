@@ -18,7 +18,7 @@ from scipy import sparse
 
 from solvers.status import WorkBudget
 
-from .reductions import ReducedCover
+from .reduced_cover import ReducedCover
 from .relaxation import costliest, rounding
 
 _LOOK_BACK = 30

@@ -20,7 +20,7 @@ from scipy import sparse
 from solvers.one_thread import quiet_highs, row_program, run_highs
 from solvers.status import WorkBudget
 
-from .reductions import ReducedCover
+from .reduced_cover import ReducedCover
 
 # Units of work per nonzero that a simplex iteration, the root with its cuts (of a
 # partial and of a full cover) and any other node cost.

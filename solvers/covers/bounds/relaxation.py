@@ -21,7 +21,7 @@ bound is evaluated here in numpy; the linear program only proposes lambda.
 import numpy as np
 from numpy.typing import NDArray
 
-from .reductions import ReducedCover
+from .reduced_cover import ReducedCover
 
 
 def rounding(n_rows: int) -> float:

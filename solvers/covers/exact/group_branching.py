@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.covers.answers import NONE, ExactSearch, Incumbent
-from solvers.covers.bounds.reductions import ReducedCover
+from solvers.covers.bounds.reduced_cover import ReducedCover
 from solvers.covers.search.prices import Prices
 from solvers.status import WorkBudget
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.covers.answers import ExactSearch, Incumbent
-from solvers.covers.bounds.reductions import ReducedCover
+from solvers.covers.bounds.reduced_cover import ReducedCover
 from solvers.covers.bounds.relaxation import rounding
 from solvers.status import WorkBudget
 

@@ -7,7 +7,7 @@ index: the same seed and budget give the same answer on any machine.
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.covers.bounds.reductions import ReducedCover
+from solvers.covers.bounds.reduced_cover import ReducedCover
 from solvers.status import WorkBudget
 
 from .swaps import Swaps

@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.covers.bounds.lagrangian import tighten
-from solvers.covers.bounds.reductions import PRICE_BITS, ReducedCover
+from solvers.covers.bounds.reduced_cover import ReducedCover
+from solvers.covers.bounds.reductions import PRICE_BITS
 from solvers.covers.bounds.relaxation import coverage_bounds
 from solvers.status import WorkBudget
 

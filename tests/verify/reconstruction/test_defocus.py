@@ -12,7 +12,7 @@ from planning.verify.reconstruction.calibration import (
     calibrate_camera,
     calibrate_projector,
 )
-from planning.verify.reconstruction.defocus import Defocus, defocus_of
+from planning.verify.reconstruction.patterns.defocus import Defocus, defocus_of
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.render.render import render_pair
 from planning.verify.reconstruction.render.rendered_light import Shown

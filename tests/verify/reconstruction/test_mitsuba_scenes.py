@@ -9,7 +9,7 @@ from geometry.files.readers import load_mesh
 from geometry.shapes.primitives import sphere
 from planning.model.bodies import Body
 from planning.model.errors import InputError
-from planning.verify.reconstruction.defocus import Defocus
+from planning.verify.reconstruction.patterns.defocus import Defocus
 from planning.verify.reconstruction.reconstruct import reconstruct
 from planning.verify.reconstruction.render.mitsuba.materials import (
     MATERIAL_NAMES,

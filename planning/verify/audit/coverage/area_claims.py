@@ -11,11 +11,7 @@ from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.estimates import ROUNDING
-from planning.verify.audit.predicates.audit_devices import (
-    AuditProjector,
-    light_starts,
-    reference_projectors,
-)
+from planning.verify.audit.predicates.audit_devices import AuditProjector, light_starts
 from planning.verify.audit.predicates.occlusion import block_of
 from planning.verify.audit.predicates.predicates import (
     CAMERA_BODY,
@@ -27,6 +23,7 @@ from planning.verify.audit.predicates.predicates import (
     SIGHT_OBSTACLE,
     light_steps,
 )
+from planning.verify.audit.predicates.reference_devices import reference_projectors
 
 _Device = PlannedProjector | PlannedCamera | AuditProjector
 _CAUSES = LIGHT_CAUSES + SIGHT_CAUSES + PAIR_CAUSES

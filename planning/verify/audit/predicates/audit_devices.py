@@ -21,7 +21,7 @@ from .audit_optics import (
     pixels_of,
     towards,
 )
-from .occlusion import Block, bodies_about, bodies_but
+from .occlusion import Block, bodies_but
 
 # Steps after which the ball is a few thousandths too large at most.
 _BALL_STEPS = 400
@@ -277,45 +277,6 @@ def audit_cameras(plan: RigPlan) -> tuple[AuditCamera, ...]:
     return tuple(
         AuditCamera(c.device, c.world_from_device, bodies_but(plan, c))
         for c in plan.cameras
-    )
-
-
-def reference_projectors(plan: RigPlan) -> tuple[AuditProjector, ...]:
-    """Return the reference projectors: each pose with the optics of its model."""
-    if not plan.projectors:
-        return ()
-    last = np.array([plan.requirements.workspace.reference_ring_radius])
-    devices, surface = _optics(plan, "projector"), plan.surface
-    poses = zip(
-        surface.reference_projectors,
-        surface.reference_rings,
-        surface.models_of("projector"),
-        strict=True,
-    )
-    return tuple(
-        AuditProjector(
-            devices[model], pose, ring, last, bodies_about(plan, "projector", pose)
-        )
-        for pose, ring, model in poses
-    )
-
-
-def _optics(plan: RigPlan, kind: str) -> list[PinholeModel | ParallelModel]:
-    """Return the optics of each model of a kind."""
-    models, devices = plan.document.rig.models(kind), getattr(plan, f"{kind}s")
-    # Of one, the plan's own device: its model is audited against it.
-    return [m.optics for m in models] if len(models) > 1 else [devices[0].device]
-
-
-def reference_cameras(plan: RigPlan) -> tuple[AuditCamera, ...]:
-    """Return the reference cameras: each pose with the optics of its model."""
-    if not plan.cameras:
-        return ()
-    devices, surface = _optics(plan, "camera"), plan.surface
-    poses = zip(surface.reference_cameras, surface.models_of("camera"), strict=True)
-    return tuple(
-        AuditCamera(devices[model], pose, bodies_about(plan, "camera", pose))
-        for pose, model in poses
     )
 
 

@@ -17,8 +17,6 @@ from .audit_devices import (
     AuditProjector,
     audit_cameras,
     audit_projectors,
-    reference_cameras,
-    reference_projectors,
 )
 from .occlusion import Shadow
 from .predicates import (
@@ -31,6 +29,7 @@ from .predicates import (
     pair_steps,
     sight_steps,
 )
+from .reference_devices import reference_cameras, reference_projectors
 
 _NOT_LIT = -1
 _Device = TypeVar("_Device")

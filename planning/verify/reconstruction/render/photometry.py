@@ -6,7 +6,7 @@ import numpy as np
 
 from planning.model.light.drawn_edges import IN_FOCUS_M, LENS_PX
 from planning.verify.reconstruction.arrays import Array, Grey, Images
-from planning.verify.reconstruction.defocus import Defocus
+from planning.verify.reconstruction.patterns.defocus import Defocus
 from planning.verify.reconstruction.scanner import Scanner
 
 from .lamp import Lamp

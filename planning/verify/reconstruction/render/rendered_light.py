@@ -7,7 +7,7 @@ import numpy as np
 from geometry.rays.rays import CHUNK, RayCaster, equal_parts
 from planning.verify.reconstruction.arrays import Array, Columns, Grey, Indices
 from planning.verify.reconstruction.calibration import ProjectorCalibration
-from planning.verify.reconstruction.defocus import Defocus
+from planning.verify.reconstruction.patterns.defocus import Defocus
 from planning.verify.reconstruction.patterns.ring_patterns import RingsForCamera
 
 from .lamp import Lamp

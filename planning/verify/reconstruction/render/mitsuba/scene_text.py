@@ -26,7 +26,7 @@ from planning.verify.reconstruction.calibration import (
     CameraCalibration,
     ProjectorCalibration,
 )
-from planning.verify.reconstruction.defocus import Defocus
+from planning.verify.reconstruction.patterns.defocus import Defocus
 from planning.verify.reconstruction.scanner import Scanner
 
 MATERIALS = "materials"

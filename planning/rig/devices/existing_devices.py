@@ -6,8 +6,8 @@ from planning.model.bodies import Body, Existing
 from planning.model.device_poses import rounded_pose
 from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.model.requirements import Requirements, Workspace
+from planning.rig.existing_tables import ExistingTable
 
-from .existing_tables import ExistingTable
 from .models import Model
 
 

@@ -8,9 +8,9 @@ from geometry.devices import DeviceModel
 from planning.model.bodies import Body
 from planning.model.errors import RigError
 from planning.model.requirements import Stock
+from planning.rig.rig_tables import ParallelTable, PinholeTable, RigTable
 
 from .rig_devices import device_of, drawn_edges
-from .rig_tables import ParallelTable, PinholeTable, RigTable
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,10 +11,9 @@ import numpy as np
 from geometry.devices import DeviceModel, ParallelModel
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.words import percent
-
-from . import optics
-from .object_size import ObjectSize
-from .rig_tables import ParallelTable, PinholeTable
+from planning.rig import optics
+from planning.rig.object_size import ObjectSize
+from planning.rig.rig_tables import ParallelTable, PinholeTable
 
 # One view of an object that takes more images side by side is refused: candidates grow
 # with their number, and a plan would take hours.

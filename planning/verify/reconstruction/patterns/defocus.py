@@ -6,8 +6,7 @@ import numpy as np
 
 from planning.model.document.input_records import ModelRecord
 from planning.model.plan import RigPlan
-
-from .arrays import Array
+from planning.verify.reconstruction.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,1 @@
+"""Devices of a rig file: optics, models, those that stand, and how they suit."""

@@ -1,0 +1,48 @@
+"""The reference poses as the audit sees them, each with the optics of its model."""
+
+import numpy as np
+
+from geometry.devices import ParallelModel, PinholeModel
+from planning.model.plan import RigPlan
+
+from .audit_devices import AuditCamera, AuditProjector
+from .occlusion import bodies_about
+
+
+def reference_projectors(plan: RigPlan) -> tuple[AuditProjector, ...]:
+    """Return the reference projectors: each pose with the optics of its model."""
+    if not plan.projectors:
+        return ()
+    last = np.array([plan.requirements.workspace.reference_ring_radius])
+    devices, surface = _optics(plan, "projector"), plan.surface
+    poses = zip(
+        surface.reference_projectors,
+        surface.reference_rings,
+        surface.models_of("projector"),
+        strict=True,
+    )
+    return tuple(
+        AuditProjector(
+            devices[model], pose, ring, last, bodies_about(plan, "projector", pose)
+        )
+        for pose, ring, model in poses
+    )
+
+
+def _optics(plan: RigPlan, kind: str) -> list[PinholeModel | ParallelModel]:
+    """Return the optics of each model of a kind."""
+    models, devices = plan.document.rig.models(kind), getattr(plan, f"{kind}s")
+    # Of one, the plan's own device: its model is audited against it.
+    return [m.optics for m in models] if len(models) > 1 else [devices[0].device]
+
+
+def reference_cameras(plan: RigPlan) -> tuple[AuditCamera, ...]:
+    """Return the reference cameras: each pose with the optics of its model."""
+    if not plan.cameras:
+        return ()
+    devices, surface = _optics(plan, "camera"), plan.surface
+    poses = zip(surface.reference_cameras, surface.models_of("camera"), strict=True)
+    return tuple(
+        AuditCamera(devices[model], pose, bodies_about(plan, "camera", pose))
+        for pose, model in poses
+    )
