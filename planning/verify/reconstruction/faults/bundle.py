@@ -15,7 +15,6 @@ from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
-from scipy.linalg import block_diag, expm
 from scipy.sparse import csc_array
 from scipy.spatial.transform import Rotation
 
@@ -104,8 +103,13 @@ class Bundle:
     def slopes(self, x: Array) -> Array:
         """Return their derivatives by the changes, (n, n_unknowns)."""
         slopes = self._slopes(*self._standing(x))[0] / self.sigma[:, None]
-        inner = block_diag(*(_inner(change) for change in by_body(x)))
-        return slopes @ np.asarray(inner, np.float64)
+        first = 0
+        for change in by_body(x):
+            turned = slice(first, first := first + len(change))
+            # A body that stands where it stood has nothing to turn back.
+            if np.any(change[TURN]):
+                slopes[:, turned] = slopes[:, turned] @ _inner(change)
+        return slopes
 
     def _standing(self, x: Array) -> tuple[Supposed, Places]:
         """How all stands after changes, and where edges lie; the last is kept."""
@@ -239,12 +243,22 @@ def by_body(x: Array) -> list[Array]:
 def _inner(change: Array) -> Array:
     """Derivative, by a body's change, of changes from where it stands after it.
 
-    A turn w changes by J dw, J the integral of exp(-s [w]) over s from 0 to 1, which is
-    a block of an exponential; a displacement shows in the turned axes.
+    A turn w = t k changes by J dw, J the integral of exp(-s [w]) over s from 0 to 1::
+
+        J = (sin t / t) 1 + (1 - sin t / t) k k^T - ((1 - cos t) / t) [k]
+
+    and a displacement shows in the turned axes.
     """
-    turn, twice, block = change[TURN], np.zeros((6, 6)), np.eye(len(change))
-    twice[:3, :3], twice[:3, 3:] = np.cross(turn, np.eye(3)), np.eye(3)
-    block[TURN, TURN] = expm(twice)[:3, 3:]
+    turn, block = change[TURN], np.eye(len(change))
+    angle = float(np.linalg.norm(turn))
+    k = turn / angle
+    sine, half = np.sinc(angle / np.pi), np.sinc(0.5 * angle / np.pi)
+    block[TURN, TURN] = (
+        sine * np.eye(3)
+        + (1.0 - sine) * np.outer(k, k)
+        # (1 - cos t) / t, of a small t too.
+        + (0.5 * angle * half * half) * np.cross(k, np.eye(3))
+    )
     block[SHIFT, SHIFT] = Rotation.from_rotvec(turn).as_matrix().T
     return block
 
