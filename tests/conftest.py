@@ -1,5 +1,6 @@
 """Fixtures that several test files share."""
 
+import gc
 import importlib
 import sys
 from collections.abc import Callable, Generator
@@ -34,6 +35,12 @@ def pytest_configure(config: pytest.Config) -> None:
     """Keep the order of the files below, where xdist would sort them by tests."""
     if hasattr(config.option, "loadscopereorder"):
         config.option.loadscopereorder = False
+
+
+def pytest_collection_finish() -> None:
+    """Look for garbage seldom, and not among modules and tests: those all stay."""
+    gc.freeze()
+    gc.set_threshold(20_000, 50, 50)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
