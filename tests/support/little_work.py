@@ -14,7 +14,6 @@ _FEW = {
     "overlaps": 3000,
     "fresh_projectors": 4000,
     "fresh_cameras": 2000,
-    "axes": 2000,
     "baselines": 2000,
     "confirming_baselines": 4000,
 }
