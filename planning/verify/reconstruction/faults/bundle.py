@@ -18,6 +18,7 @@ import numpy as np
 from scipy.sparse import csc_array
 from scipy.spatial.transform import Rotation
 
+from geometry.arrays import cross
 from planning.verify.reconstruction.arrays import Array, Indices
 from planning.verify.reconstruction.calibration import (
     CameraCalibration,
@@ -196,7 +197,7 @@ def _projector_slopes(rig: Supposed, p: int, points: Array) -> tuple[Array, Arra
     focal, centre = np.diag(projector.matrix)[:2], projector.matrix[:2, 2]
     by_place = law.plane_slopes(local, by_pixel * focal)
     zoom = _dot(by_pixel, pixels - centre)
-    columns = [-np.cross(local, by_place), -by_place, zoom, by_pixel]
+    columns = [-cross(local, by_place), -by_place, zoom, by_pixel]
     return by_place @ pose[:3, :3].T, np.column_stack(columns)
 
 
@@ -223,10 +224,10 @@ def _camera_slopes(
         ]
     )
     zoom = -_dot(by_pixel, pixels - camera.matrix[:2, 2])
-    of_camera = [np.cross(local, across), across, zoom, -by_pixel]
+    of_camera = [cross(local, across), across, zoom, -by_pixel]
     turn = body.world_from_device[:3, :3]
     local, along = (points - body.centre) @ turn, lever @ turn
-    of_object = [np.cross(local, along), along, _dot(along, local)]
+    of_object = [cross(local, along), along, _dot(along, local)]
     per_px = np.linalg.norm(by_pixel, axis=1)
     return np.column_stack(of_camera), np.column_stack(of_object), per_px, rising[:, 0]
 
