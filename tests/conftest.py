@@ -146,7 +146,7 @@ def _load(name: str) -> ModuleType:
 
 @pytest.fixture(scope="session")
 def with_little_work() -> Callable[[], AbstractContextManager[None]]:
-    """A quarter of the samples behind claims, and rough bounds over all poses."""
+    """Few samples behind claims and confirmations, rough bounds over all poses."""
 
     @contextmanager
     def little() -> Generator[None]:

@@ -20,7 +20,7 @@ _FEW = {
 
 
 def work_little(patch):
-    """Let claims rest on a quarter of the samples, and bounds cost little."""
+    """Let claims and confirmations rest on few samples, and bounds cost little."""
     draw_fewer(patch, **_FEW)
     bound_roughly(patch)
 
