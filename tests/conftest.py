@@ -1,5 +1,6 @@
 """Fixtures that several test files share."""
 
+import gc
 import importlib
 import sys
 from collections.abc import Callable, Generator
@@ -34,6 +35,12 @@ def pytest_configure(config: pytest.Config) -> None:
     """Keep the order of the files below, where xdist would sort them by tests."""
     if hasattr(config.option, "loadscopereorder"):
         config.option.loadscopereorder = False
+
+
+def pytest_collection_finish() -> None:
+    """Look for garbage seldom, and not among modules and tests: those all stay."""
+    gc.freeze()
+    gc.set_threshold(20_000, 50, 50)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -139,7 +146,7 @@ def _load(name: str) -> ModuleType:
 
 @pytest.fixture(scope="session")
 def with_little_work() -> Callable[[], AbstractContextManager[None]]:
-    """A quarter of the samples behind claims, and rough bounds over all poses."""
+    """Few samples behind claims and confirmations, rough bounds over all poses."""
 
     @contextmanager
     def little() -> Generator[None]:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.arrays import Array, Ints, Mask
+from geometry.arrays import Array, Ints, Mask, rows_of
 
 from .mesh import TriangleMesh
 
@@ -33,7 +33,10 @@ class SurfaceSamples:
     def take(self, chosen: Ints | Mask) -> "SurfaceSamples":
         """Return some of the samples, each still standing for the same area."""
         return SurfaceSamples(
-            self.points[chosen], self.normals[chosen], self.faces[chosen], self.weight
+            rows_of(self.points, chosen),
+            rows_of(self.normals, chosen),
+            rows_of(self.faces, chosen),
+            self.weight,
         )
 
 

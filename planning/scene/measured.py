@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import rows_of
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import TriangulationLimits
 from planning.scene.limits.camera_limits import ViewedSamples
@@ -75,7 +76,7 @@ def taken(
     """Return some of the samples, lit as stated for all."""
     return LitSamples(
         samples.target.take(chosen),
-        lit[chosen],
+        rows_of(lit, chosen),
         tuple(light.take(chosen) for light in samples.lights),
         tuple(surfaces.take(chosen) for surfaces in samples.surfaces),
     )
@@ -129,7 +130,7 @@ def pairs_of(
         places = np.flatnonzero(lit.lit[samples, p] & wanted)
         chosen = samples[places]
         quality = pair_quality(
-            lit.target.samples.normals[chosen],
+            rows_of(lit.target.samples.normals, chosen),
             lit.lights[p].take(chosen),
             lit.surfaces[p].take(chosen),
             view.take(places),

@@ -1,12 +1,13 @@
 """Samples of the surface with what the limits ask of each."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import rows_of
 from geometry.mesh.sampling import SurfaceSamples
 
 
@@ -35,7 +36,9 @@ class Target:
     def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> "Target":
         """Return some of the samples."""
         return Target(
-            self.samples.take(chosen), self.steep[chosen], self.member[chosen]
+            self.samples.take(chosen),
+            rows_of(self.steep, chosen),
+            rows_of(self.member, chosen),
         )
 
 
@@ -45,7 +48,7 @@ class SampleArrays:
 
     def take(self, chosen: NDArray[np.int64]) -> Self:
         """Return what is known of some of the samples."""
-        return type(self)(*(array[chosen] for array in self._arrays()))
+        return type(self)(*[rows_of(array, chosen) for array in self._arrays()])
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
@@ -54,7 +57,7 @@ class SampleArrays:
         return cls(*(np.concatenate(same) for same in arrays))
 
     def _arrays(self) -> list[NDArray[Any]]:
-        return [getattr(self, field.name) for field in fields(self)]
+        return [getattr(self, name) for name in self.__dataclass_fields__]
 
 
 @dataclass(frozen=True, eq=False)

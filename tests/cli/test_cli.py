@@ -86,14 +86,15 @@ min_reachable = 0.5
 def runs(face):
     """One job with 1 and with 2 threads, the second with --json.
 
-    The check's own determinism over threads is tested with the check.
+    The check's own determinism over threads is tested with the check, that of the
+    paper's route with it.
     """
     folder = face.parent
     (folder / "front.toml").write_text(RIG)
     found = []
     for threads in (1, 2):
         words = ["--mesh", "face.obj", "--max-projectors", "3", "-o", f"plan{threads}"]
-        words += ["--rig", "front.toml"]
+        words += ["--rig", "front.toml", "--cameras-by", "cover"]
         words += ["--threads", str(threads)]
         words += ["--json", "--no-check"] * (threads == 2)
         found.append(run(*words, cwd=folder, threads=threads, before=LITTLE))

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.little_work import draw_fewer
+from support.little_work import draw_fewer, work_little
 from support.plain_shapes import box
 
 from geometry.devices import PinholeModel
@@ -67,6 +67,7 @@ region_coverage = 0
 def fewer_samples():
     """A flipped sign moves areas by far more than a sixth of the samples can hide."""
     with pytest.MonkeyPatch.context() as patch:
+        work_little(patch)
         draw_fewer(patch, claims=2000)
         yield
 
@@ -96,9 +97,8 @@ def made(scene, tmp_path_factory):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(pipeline, "write_plan", kept)
-        plan = pipeline.plan_rig(
-            scene, load_rig(path), max_projectors=4, target="surface", check=False
-        )
+        wishes = {"target": "surface", "cameras_by": "cover", "check": False}
+        plan = pipeline.plan_rig(scene, load_rig(path), max_projectors=4, **wishes)
     return plan, sources[-1]
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from support.little_work import bound_roughly, draw_fewer
 
 from geometry.shapes.sample_head.sample_head import sample_head
 from planning import load_mesh, load_rig, plan_rig
@@ -48,8 +49,11 @@ def head():
 
 
 @pytest.fixture(scope="module")
-def plans(head, tmp_path_factory, with_little_work):
-    """The plan of a file in mm, and of one in um, turned and 10^5 mm away."""
+def plans(head, tmp_path_factory):
+    """The plan of a file in mm, and of one in um, turned and 10^5 mm away.
+
+    With fewer samples to move devices on, rounding decides between places.
+    """
     folder = tmp_path_factory.mktemp("meshes")
     moved = head.vertices @ TURN.T + SHIFT_M
     found = []
@@ -62,7 +66,9 @@ def plans(head, tmp_path_factory, with_little_work):
         rows += [f"3 {a} {b} {c}" for a, b, c in head.faces.tolist()]
         head_line = f"OFF\n{len(vertices)} {len(head.faces)} 0"
         path.write_text("\n".join([head_line, *rows]) + "\n")
-        with with_little_work():
+        with pytest.MonkeyPatch.context() as patch:
+            draw_fewer(patch, claims=3000, overlaps=3000)
+            bound_roughly(patch)
             found.append(planned(path, unit, up))
     return found
 

@@ -42,19 +42,21 @@ max_exposure_ms = 80.0
 
 
 @pytest.fixture(scope="module")
-def plan(tmp_path_factory) -> RigPlan:
+def plan(tmp_path_factory, with_little_work) -> RigPlan:
     path = tmp_path_factory.mktemp("sigma") / "rig.toml"
     path.write_text(RIG)
     try:
-        return plan_rig(
-            box((0.15, 0.15, 0.05), divisions=12),
-            load_rig(path),
-            max_projectors=3,
-            target="surface",
-            min_reachable=0.3,
-            check=False,
-            threads=1,
-        )
+        with with_little_work():
+            return plan_rig(
+                box((0.15, 0.15, 0.05), divisions=12),
+                load_rig(path),
+                max_projectors=3,
+                target="surface",
+                min_reachable=0.3,
+                check=False,
+                cameras_by="cover",
+                threads=1,
+            )
     except RequirementError as missed:
         return missed.plan
 

@@ -7,11 +7,21 @@ from planning.scene.draws import DRAWS
 
 # Of the work on bounds over all poses, which most plans spend most of their time on.
 _SHARE = 0.1
+# Samples that claims rest on, and that confirm what others were fitted to. Covers are
+# chosen, and rings spaced, on as many as ever.
+_FEW = {
+    "claims": 3000,
+    "overlaps": 3000,
+    "fresh_projectors": 4000,
+    "fresh_cameras": 2000,
+    "baselines": 2000,
+    "confirming_baselines": 4000,
+}
 
 
 def work_little(patch):
-    """Let claims rest on a quarter of the samples, and bounds cost little."""
-    draw_fewer(patch, claims=3000, overlaps=3000)
+    """Let claims and confirmations rest on few samples, and bounds cost little."""
+    draw_fewer(patch, **_FEW)
     bound_roughly(patch)
 
 

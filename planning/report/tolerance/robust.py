@@ -18,8 +18,6 @@ all rigs did.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from scipy.stats import binom
-
 from planning.cameras.surer_cameras import Aim
 from planning.model.calibration_errors import AS_PLANNED, PERFECT, Robust
 from planning.model.document.coverage_records import RobustRecord
@@ -79,6 +77,9 @@ def least_met(quantile: float, n: int) -> int:
     The least k with P(K >= k) <= 5 % for K of n rigs each of which meets it with the
     probability `quantile`; n at most.
     """
+    # Takes a second to load, which only plans that ask for drawn rigs need.
+    from scipy.stats import binom
+
     return min(int(binom.ppf(1.0 - _DOUBT, n, quantile)) + 1, n)
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.arrays import Array, Ints, Mask
+from geometry.arrays import Array, Ints, Mask, rows_of
 from planning.model.errors import PlanFileError
 from planning.model.surface import Surface
 
@@ -46,7 +46,7 @@ class AuditSamples:
 
     def take(self, chosen: Ints | Mask) -> "AuditSamples":
         """Return some of the samples, each still standing for the same area."""
-        return AuditSamples(*(column[chosen] for column in vars(self).values()))
+        return AuditSamples(*[rows_of(c, chosen) for c in vars(self).values()])
 
 
 def draw_samples(surface: Surface, target: str, n: int, seed: int) -> AuditSamples:

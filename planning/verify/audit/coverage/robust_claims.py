@@ -7,7 +7,6 @@ audit's own; floors of regions, and what the plan without it would do, aren't lo
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import binom
 
 from geometry.arrays import Array, Mask
 from planning.model.calibration_errors import Robust
@@ -57,6 +56,9 @@ def audit_robust(case: AuditCase, findings: AuditFindings) -> None:
         return
     if not _audit_numbers(plan, robust, record, below):
         return
+    # Takes a second to load, which only plans with drawn rigs need.
+    from scipy.stats import binom
+
     share = record.n_met / max(record.n_drawn, 1)
     error = np.sqrt(share * (1.0 - share) / max(record.n_drawn, 1))
     claimed = max(share - _ERRORS * error, 0.0)
@@ -76,6 +78,8 @@ def _audit_numbers(
 
     Return whether all of them can be.
     """
+    from scipy.stats import binom
+
     required, n_before = plan.requirements, len(below.failures)
     for name in _NAMES:
         now, asked = getattr(required, name), getattr(robust, name)

@@ -6,7 +6,7 @@ numerically: an error of sign or of order shows as a difference of areas.
 
 import numpy as np
 
-from geometry.arrays import Array, Mask
+from geometry.arrays import Array, Mask, cross
 from geometry.devices import PinholeModel
 
 _STEP = 1e-5
@@ -45,10 +45,12 @@ def pixels_of(device: PinholeModel, local: Array) -> Array:
     k1, k2, p1, p2, k3 = device.distortion
     x = local[:, 0] / local[:, 2]
     y = local[:, 1] / local[:, 2]
-    s = x**2 + y**2
-    radial = 1 + k1 * s + k2 * s**2 + k3 * s**3
-    bent_x = x * radial + 2 * p1 * x * y + p2 * (s + 2 * x**2)
-    bent_y = y * radial + p1 * (s + 2 * y**2) + 2 * p2 * x * y
+    bent_x, bent_y = x, y
+    if any(device.distortion):
+        s = x**2 + y**2
+        radial = 1 + k1 * s + k2 * s**2 + k3 * s**3
+        bent_x = x * radial + 2 * p1 * x * y + p2 * (s + 2 * x**2)
+        bent_y = y * radial + p1 * (s + 2 * y**2) + 2 * p2 * x * y
     (fx, skew, cx), (_, fy, cy) = device.camera_matrix[:2]
     return np.column_stack([fx * bent_x + skew * bent_y + cx, fy * bent_y + cy])
 
@@ -82,9 +84,9 @@ def pixel_gradient(device: PinholeModel, local: Array, across: Array) -> Array:
     """
     r = local / np.linalg.norm(local, axis=1, keepdims=True)
     spare = np.where(np.abs(r[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
-    e1 = np.cross(r, spare)
+    e1 = cross(r, spare)
     e1 /= np.linalg.norm(e1, axis=1, keepdims=True)
-    e2 = np.cross(r, e1)
+    e2 = cross(r, e1)
     a, b = (
         (pixels_of(device, r + _STEP * e) - pixels_of(device, r - _STEP * e))
         / (2 * _STEP)

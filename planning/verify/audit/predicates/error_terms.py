@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.arrays import Array
+from geometry.arrays import Array, cross
 from planning.model.light.drawn_edges import DrawnEdges
 from planning.model.light.light_budget import LightBudget
 from planning.model.requirements import TriangulationLimits
@@ -114,7 +114,7 @@ def error_terms(pair: PairGeometry, limits: TriangulationLimits) -> dict[str, Ar
         ):
             offset = pair.points - device.world_from_device[:3, 3]
             terms[name] = np.sqrt(
-                (angle * np.linalg.norm(np.cross(offset, across), axis=1)) ** 2
+                (angle * np.linalg.norm(cross(offset, across), axis=1)) ** 2
                 + position**2 * dot(across, across)
                 + (focal * longer) ** 2
                 + (principal * per_px) ** 2

@@ -15,10 +15,10 @@ from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
-from scipy.linalg import block_diag, expm
 from scipy.sparse import csc_array
 from scipy.spatial.transform import Rotation
 
+from geometry.arrays import cross
 from planning.verify.reconstruction.arrays import Array, Indices
 from planning.verify.reconstruction.calibration import (
     CameraCalibration,
@@ -104,8 +104,13 @@ class Bundle:
     def slopes(self, x: Array) -> Array:
         """Return their derivatives by the changes, (n, n_unknowns)."""
         slopes = self._slopes(*self._standing(x))[0] / self.sigma[:, None]
-        inner = block_diag(*(_inner(change) for change in by_body(x)))
-        return slopes @ np.asarray(inner, np.float64)
+        first = 0
+        for change in by_body(x):
+            turned = slice(first, first := first + len(change))
+            # A body that stands where it stood has nothing to turn back.
+            if np.any(change[TURN]):
+                slopes[:, turned] = slopes[:, turned] @ _inner(change)
+        return slopes
 
     def _standing(self, x: Array) -> tuple[Supposed, Places]:
         """How all stands after changes, and where edges lie; the last is kept."""
@@ -192,7 +197,7 @@ def _projector_slopes(rig: Supposed, p: int, points: Array) -> tuple[Array, Arra
     focal, centre = np.diag(projector.matrix)[:2], projector.matrix[:2, 2]
     by_place = law.plane_slopes(local, by_pixel * focal)
     zoom = _dot(by_pixel, pixels - centre)
-    columns = [-np.cross(local, by_place), -by_place, zoom, by_pixel]
+    columns = [-cross(local, by_place), -by_place, zoom, by_pixel]
     return by_place @ pose[:3, :3].T, np.column_stack(columns)
 
 
@@ -219,10 +224,10 @@ def _camera_slopes(
         ]
     )
     zoom = -_dot(by_pixel, pixels - camera.matrix[:2, 2])
-    of_camera = [np.cross(local, across), across, zoom, -by_pixel]
+    of_camera = [cross(local, across), across, zoom, -by_pixel]
     turn = body.world_from_device[:3, :3]
     local, along = (points - body.centre) @ turn, lever @ turn
-    of_object = [np.cross(local, along), along, _dot(along, local)]
+    of_object = [cross(local, along), along, _dot(along, local)]
     per_px = np.linalg.norm(by_pixel, axis=1)
     return np.column_stack(of_camera), np.column_stack(of_object), per_px, rising[:, 0]
 
@@ -239,12 +244,22 @@ def by_body(x: Array) -> list[Array]:
 def _inner(change: Array) -> Array:
     """Derivative, by a body's change, of changes from where it stands after it.
 
-    A turn w changes by J dw, J the integral of exp(-s [w]) over s from 0 to 1, which is
-    a block of an exponential; a displacement shows in the turned axes.
+    A turn w = t k changes by J dw, J the integral of exp(-s [w]) over s from 0 to 1::
+
+        J = (sin t / t) 1 + (1 - sin t / t) k k^T - ((1 - cos t) / t) [k]
+
+    and a displacement shows in the turned axes.
     """
-    turn, twice, block = change[TURN], np.zeros((6, 6)), np.eye(len(change))
-    twice[:3, :3], twice[:3, 3:] = np.cross(turn, np.eye(3)), np.eye(3)
-    block[TURN, TURN] = expm(twice)[:3, 3:]
+    turn, block = change[TURN], np.eye(len(change))
+    angle = float(np.linalg.norm(turn))
+    k = turn / angle
+    sine, half = np.sinc(angle / np.pi), np.sinc(0.5 * angle / np.pi)
+    block[TURN, TURN] = (
+        sine * np.eye(3)
+        + (1.0 - sine) * np.outer(k, k)
+        # (1 - cos t) / t, of a small t too.
+        + (0.5 * angle * half * half) * np.cross(k, np.eye(3))
+    )
     block[SHIFT, SHIFT] = Rotation.from_rotvec(turn).as_matrix().T
     return block
 
