@@ -54,27 +54,28 @@ def marginals(cover: CandidateCover, selection: Selection) -> Marginals:
                 bound = min(bound, selection.required - 1)
             n_covered[count] = cover.n_covered(best), bound
         by_count[count] = best
-    return Marginals(by_count, n_covered, _greedy_count(cover))
+    return Marginals(by_count, n_covered, _greedy_count(cover, selection.needed))
 
 
-def _greedy_count(cover: CandidateCover) -> int:
+def _greedy_count(cover: CandidateCover, needed: int) -> int:
     """How many candidates it takes when each adds most samples, lower index first.
 
     Of samples that are lacking: of any while the total is, then of regions' alone.
+    Where that runs out of stock, of any number of each model, but no fewer than are
+    needed.
     """
     covers, count = cover.covers, cover.n_existing
     uncovered = ~np.any(covers[:, :count], axis=1)
-    left = None if cover.stock is None else cover.stock.left(np.arange(count))
+    taken = list(range(count))
     while not cover.quotas.enough(~uncovered):
         wanted = uncovered & cover.quotas.wanted(~uncovered)
         gains = covers[wanted].sum(axis=0)
-        if cover.stock is not None and left is not None:
+        if cover.stock is not None:
+            left = cover.stock.left(np.array(taken, dtype=np.int64))
             gains[left[cover.stock.kinds] <= 0] = 0
         best = int(np.argmax(gains))
         if not gains[best] > 0:
-            break
-        if cover.stock is not None and left is not None:
-            left[cover.stock.kinds[best]] -= 1
+            return max(_greedy_count(cover.without_stock, 0), needed)
         uncovered &= ~covers[:, best]
-        count += 1
-    return count
+        taken.append(best)
+    return len(taken)

@@ -95,3 +95,4 @@ def test_a_stock_that_isnt_enough_is_taken_and_said(ball):
     assert cover.selection.needed == len(free.cameras)
     proof = camera_stage(scene, cover).certificate
     assert max(row.count for row in proof.by_count) == 2
+    assert proof.greedy_count >= proof.needed.lower_bound

@@ -31,14 +31,20 @@ def proof_lines(plan: RigPlan) -> list[str]:
     return [
         "",
         _proof(plan, "projector", requirements.dominant_coverage, "light"),
-        _continuous(proofs.projectors, poses),
+        _continuous(proofs.projectors, poses + _of_any(plan, "projector")),
         _proof(plan, "camera", requirements.coverage, "measure")
         + " (given these projectors)",
-        _continuous(proofs.cameras, "position, aim and roll"),
+        _continuous(proofs.cameras, "position, aim and roll" + _of_any(plan, "camera")),
         *route_lines(proofs.cameras),
         f"         {_regions(plan)}",
         *_excluded(proofs.projectors),
     ]
+
+
+def _of_any(plan: RigPlan, kind: str) -> str:
+    """A bound over all poses knows no stock."""
+    several = len(plan.document.rig.models(kind)) > 1
+    return " of any number of each model" * several
 
 
 def route_lines(proof: Certificate) -> list[str]:
