@@ -139,7 +139,7 @@ def test_no_prediction_of_what_is_measured_is_found(failures):
 def test_noise_and_calibration_are_told_apart(plan):
     sigma = plan.coverage.sigma
     alone, whole = (line for line in coverage_lines(plan) if "median" in line)
-    assert "edge noise and the panel's pixels alone" in alone
+    assert "edge noise, that of the light and the panel's pixels alone" in alone
     assert f"median {1e3 * sigma.noise_median_m:.3f} mm" in alone
     assert f"median {1e3 * sigma.median_m:.3f} mm" in whole
     assert "(limit 0.3); rms by term edges" in whole

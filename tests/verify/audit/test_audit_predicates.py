@@ -241,6 +241,7 @@ def test_the_audit_imports_nothing_of_the_planner():
         "geometry.rays.proximity",
         "geometry.rays.rays",
         "geometry.arrays",
+        "geometry.parallel",
         "geometry.devices",
     }
     for path in AUDIT.rglob("*.py"):

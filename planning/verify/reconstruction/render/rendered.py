@@ -43,7 +43,7 @@ class RenderedScene:
         middle = truth.mesh.centre
         self.lenses = [
             photometry.through_lens(
-                self._cameras[camera.id].focus,
+                self._cameras.get(camera.id, camera).focus,
                 float((middle - camera.centre) @ camera.axis),
                 camera.focal_px,
             )
