@@ -7,6 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
 from pydantic import ValidationError
 
 from geometry.files.file_content import file_content
@@ -133,7 +134,15 @@ class RigPlan:
         _require_plan(content, path)
         document = _document(content, str(path))
         surface = document.surface
-        return cls(document, Surface.load(path.parent / surface.path, surface.sha256))
+        loaded = Surface.load(path.parent / surface.path, surface.sha256)
+        for kind in ("projector", "camera"):
+            models, n = loaded.models_of(kind), len(document.rig.models(kind))
+            if not np.all((models >= 0) & (models < n)):
+                raise PlanFileError(
+                    f"{path}: reference_{kind}_models of {surface.path} names models "
+                    f"{models.min()} to {models.max()}, the rig has {n}; plan again"
+                )
+        return cls(document, loaded)
 
 
 def _require_plan(content: bytes, path: Path) -> None:

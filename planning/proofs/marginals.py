@@ -54,6 +54,12 @@ def marginals(cover: CandidateCover, selection: Selection) -> Marginals:
                 bound = min(bound, selection.required - 1)
             n_covered[count] = cover.n_covered(best), bound
         by_count[count] = best
+    most_of_all = np.inf
+    for count in sorted(n_covered, reverse=True):
+        # No fewer cover more than the most of more.
+        covered, bound = n_covered[count]
+        most_of_all = min(most_of_all, bound)
+        n_covered[count] = covered, int(most_of_all)
     return Marginals(by_count, n_covered, _greedy_count(cover, selection.needed))
 
 

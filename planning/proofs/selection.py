@@ -241,6 +241,7 @@ def _out_of_stock(cover: CandidateCover, budget: float) -> Selection:
     """What covers most of a stock that isn't enough, and how many would be."""
     wanted = select_fewest(replace(cover.without_stock, max_count=None), budget=budget)
     chosen, bound = cover.most_covering(cover.most, None)
+    chosen = _without_idle(cover, chosen)
     return replace(
         wanted,
         chosen=chosen,
@@ -248,6 +249,20 @@ def _out_of_stock(cover: CandidateCover, budget: float) -> Selection:
         n_covered=cover.n_covered(chosen),
         n_covered_bound=bound,
     )
+
+
+def _without_idle(
+    cover: CandidateCover, chosen: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Return candidates less those without which as much is covered, least first."""
+    kept = chosen
+    for one in sorted(chosen.tolist(), key=lambda k: int(cover.covers[:, k].sum())):
+        fewer = kept[kept != one]
+        if one >= cover.n_existing and np.array_equal(
+            cover.covered(fewer), cover.covered(kept)
+        ):
+            kept = fewer
+    return kept
 
 
 def fewest_count(cover: CandidateCover) -> int:

@@ -9,13 +9,15 @@ from support.little_work import draw_fewer
 
 from geometry.devices import PinholeModel
 from geometry.shapes.primitives import sphere
-from planning.cameras.camera_cover import camera_candidate_views
+from planning.cameras.camera_cover import camera_candidate_views, candidate_cover
 from planning.cameras.camera_routes import better_route, cover_by_cover
 from planning.cameras.proved_cameras import camera_stage
 from planning.model.planned import PlannedProjector
 from planning.model.requirements import Stock
 from planning.projectors.projector_stage import plan_projectors
 from planning.proofs.device_stock import within_stock
+from planning.proofs.marginals import marginals
+from planning.proofs.selection import select_fewest
 from planning.rig.rig import load_rig
 from planning.rings.ring_radii import uniform_radii
 from planning.scene.lights import ring_frame
@@ -96,3 +98,21 @@ def test_a_stock_that_isnt_enough_is_taken_and_said(ball):
     proof = camera_stage(scene, cover).certificate
     assert max(row.count for row in proof.by_count) == 2
     assert proof.greedy_count >= proof.needed.lower_bound
+
+
+def test_of_a_stock_that_isnt_enough_nothing_idle_is_taken(ball):
+    """Each that is taken measures what no other does; bounds rise with counts."""
+    stock = (Stock("camera", "wide", 1), Stock("camera", "narrow", 2))
+    scene, _, cover = chosen(ball, *stock)
+    cameras = cover.candidates.cameras
+    problem = candidate_cover(scene, cover.measured, cover.samples, cameras)
+    problem = replace(problem, share=1.0)
+    selection = select_fewest(problem)
+    assert selection.status == "infeasible"
+    for one in selection.chosen:
+        others = selection.chosen[selection.chosen != one]
+        assert problem.n_covered(others) < selection.n_covered
+    found = sorted(marginals(problem, selection).n_covered.items())
+    bounds = [bound for _, (_, bound) in found]
+    assert bounds == sorted(bounds)
+    assert all(covered <= bound for _, (covered, bound) in found)

@@ -246,3 +246,22 @@ def test_what_cannot_be_played_is_said(patterns, monkeypatch, words, code, told)
     assert ended == code
     # Click's own page stands before what is wrong with the usage.
     assert told in error.splitlines()[-1]
+
+
+def test_several_cameras_make_a_list_with_counts(tmp_path):
+    """`--camera NAME:N` again and again; what follows the colon is a number."""
+    path, one = tmp_path / "shelf.toml", "basler/acA2040-55um + 16mm"
+    words = ("rigs", "new", "--object-mm", "200", "-o", str(path))
+    listed = ("--camera", f"{one}:2", "--camera", "basler/acA2440-75um")
+    code, told, _ = plan(*words, *listed)
+    assert code == 0
+    assert "of basler/acA2440-75um:" in told
+    first, second = load_rig(path).models("camera")
+    assert (first.table.device, first.table.count) == (one, 2)
+    assert second.table.device.startswith("basler/acA2440-75um + ")
+    assert second.table.count is None
+    for wrong in (f"{one}:0", f"{one}:many"):
+        other = (*words[:-1], str(tmp_path / "other.toml"))
+        code, _, told = plan(*other, "--camera", wrong)
+        assert code == 2
+        assert "how many there are, from 1 to 1000" in told

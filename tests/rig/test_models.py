@@ -123,7 +123,9 @@ def test_projectors_of_a_list_are_focused_alike():
         "pixel_um": 8.0,
         "focus": FOCUS,
     }
-    with pytest.raises(RigError, match="focused differently"):
+    with pytest.raises(
+        RigError, match=r"\[\[projector\]\] 2 is focused at 1000 mm through a pupil of"
+    ):
         load_rig({"base": "default", "projector": [first, other]})
 
 
@@ -131,3 +133,16 @@ def test_a_model_that_isnt_sharp_is_named():
     far = WIDE | {"range_mm": [2000.0, 3000.0]}
     with pytest.raises(InfeasibleLimitsError, match="the camera 2 is sharp"):
         mixed(NARROW, far)
+
+
+def test_a_whole_device_takes_the_place_of_a_list():
+    rig = mixed(NARROW, WIDE)
+    assert [m.name for m in rig.replace(camera=(WIDE, NARROW)).models("camera")] == [
+        "wide",
+        "narrow",
+    ]
+    for one in (NARROW, "basler/acA2040-55um + 16mm"):
+        assert len(rig.replace(camera=one).models("camera")) == 1
+    # Some figures of the first leave the others where they are.
+    longer = rig.replace(camera={"focal_mm": 35.0})
+    assert len(longer.models("camera")) == 2

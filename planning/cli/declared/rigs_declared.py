@@ -119,8 +119,10 @@ class Pixels(click.ParamType):  # pyright: ignore[reportMissingTypeArgument]
 )
 @click.option(
     "--camera",
-    metavar="NAME[ + LENS]",
-    help="A camera of `plan rigs devices`, with a lens or a focal length: + 16mm. Or:",
+    multiple=True,
+    metavar="NAME[ + LENS][:N]",
+    help="A camera of `plan rigs devices`, with a lens or a focal length: + 16mm, and "
+    "how many there are: :4. Several times for several models. Or:",
 )
 @click.option("--sensor-px", type=Pixels(), metavar="WxH", help="Pixels of a camera.")
 @click.option("--pixel-um", type=Positive(), metavar="UM", help="Size of its pixels.")

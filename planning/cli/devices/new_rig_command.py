@@ -32,9 +32,12 @@ def new_rig_command(options: Mapping[str, Any]) -> int:
     known = given(options, *_KEYS)
     if options["projector"] and options["throw_ratio"]:
         raise click.UsageError("give --projector or --throw-ratio, not both")
-    if options["camera"] and options["sensor_px"]:
+    cameras = [_counted(text) for text in options["camera"]]
+    if cameras:
+        (known["camera"], known["camera_count"]), *known["more_cameras"] = cameras
+    if cameras and options["sensor_px"]:
         raise click.UsageError("give --camera or --sensor-px, not both")
-    if options["focal_mm"] and "+" in (options["camera"] or ""):
+    if options["focal_mm"] and any("+" in name for name, _ in cameras):
         raise click.UsageError("--camera names a lens; leave --focal-mm out")
     for key, needed in _GOES_WITH.items():
         if key in known and needed not in known:
@@ -71,13 +74,26 @@ def new_rig_command(options: Mapping[str, Any]) -> int:
 
 _KEYS = (
     *("object_mm", "projector", "throw_ratio", "projector_px", "offset_percent"),
-    *("camera", "sensor_px", "pixel_um", "focal_mm", "distance_mm"),
+    *("sensor_px", "pixel_um", "focal_mm", "distance_mm"),
 )
 _GOES_WITH = {
     "projector_px": "throw_ratio",
     "offset_percent": "throw_ratio",
     "pixel_um": "sensor_px",
 }
+
+
+def _counted(text: str) -> tuple[str, int | None]:
+    """Return a camera's name, and how many there are of it: NAME:4."""
+    name, colon, count = text.rpartition(":")
+    if not colon:
+        return text, None
+    if not (count.isascii() and count.isdigit() and 1 <= int(count[:9]) <= 1000):
+        raise click.UsageError(
+            f"--camera {text!r}: what follows the colon is how many there are, from 1 "
+            f"to 1000"
+        )
+    return name, int(count)
 
 
 def _is_terminal() -> bool:

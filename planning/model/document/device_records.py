@@ -221,6 +221,14 @@ class CameraRecord(Part):
         device = PinholeModel(
             np.array(self.K), self.resolution, self.range_m, self.distortion
         )
+        if any(self.distortion):
+            width, height = self.resolution
+            ends = [(x, y) for x in (0, width - 1) for y in (0, height - 1)]
+            if not np.all(np.isfinite(device.rays(np.array(ends, dtype=np.float64)))):
+                raise ValueError(
+                    f"{self.id}: distortion = {self.distortion} folds the image: its "
+                    f"corners see nothing"
+                )
         pose = np.array(self.world_from_device)
         existing = self.name if self.existing else ""
         return PlannedCamera(self.id, pose, device, existing, self.body, self.model)

@@ -133,7 +133,9 @@ def _devices(plan: RigPlan, room: int) -> list[str]:
         )
         lines.append(
             f"{device.id:<4} {x:9.1f} {y:9.1f} {z:9.1f}  {pan:9.1f} {tilt:7.1f} "
-            f"{roll:7.1f}   {azimuth:11.1f} {elevation:11.1f}   {distance:8.1f}{kept}"
+            f"{roll:7.1f}   {azimuth:11.1f} {elevation:11.1f}   {distance:8.1f}{kept}"[
+                :COLUMNS
+            ]
         )
     if len(told) < len(every):
         lines.append(f"         and {len(every) - len(told)} more: {_ELSEWHERE}")

@@ -133,11 +133,16 @@ def axis_name(direction: Sequence[float] | NDArray[np.float64]) -> str:
 def used_up(document: PlanDocument, kind: str) -> str:
     """Return which counted models of a `projector` or a `camera` none is left of.
 
-    Empty where some are, or there is one model.
+    Empty where some are.
     """
-    stock = document.requirements.stock_of(kind)
-    taken = Counter(record.model for record in getattr(document, f"{kind}s"))
-    gone = [f"{model} ({n})" for model, n in stock.items() if taken[model] >= n]
+    models, records = document.rig.models(kind), getattr(document, f"{kind}s")
+    taken = Counter(record.model for record in records)
+    gone = [
+        f"{model.name} ({model.count})"
+        for model in models
+        if model.count is not None
+        and taken[model.name if len(models) > 1 else ""] >= model.count
+    ]
     return " and ".join(gone)
 
 

@@ -1,7 +1,7 @@
 """Which requirements a plan misses, why, and what would help."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from planning.model.document.certificates import Certificate
 from planning.model.document.coverage_records import Coverage, Relaxation
@@ -16,6 +16,9 @@ from planning.scene.limits.projector_limits import PROJECTOR_LIMITS
 from .cause_words import areas_line, causes_line, rounded_down
 from .device_lines import used_up
 from .region_lines import floor_shortfalls
+
+# What accepts the one requirement that a plan misses.
+_ACCEPTS = " accepts this plan"
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,15 @@ def shortfalls(plan: RigPlan) -> tuple[str, ...]:
 
 def missing(plan: RigPlan) -> Iterator[Shortfall]:
     """Yield the requirements that a plan misses."""
+    every = list(_missing(plan))
+    for one in every:
+        # Where several are missed, what accepts one doesn't accept the plan.
+        told = _ACCEPTS if len(every) == 1 else " asks for no more"
+        helps = (text.replace(_ACCEPTS, told) for text in one.helps)
+        yield replace(one, helps=tuple(helps))
+
+
+def _missing(plan: RigPlan) -> Iterator[Shortfall]:
     required, check = plan.requirements, plan.document.reconstruction
     yield from _reachable(plan.document, required)
     yield from _covered(plan.document, required)

@@ -1,6 +1,6 @@
 """Existing devices in the world, and whether so many may stand."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from planning.model.bodies import Body, Existing
 from planning.model.device_poses import rounded_pose
@@ -23,6 +23,9 @@ def build_existing(
     Raises:
         RigError: If one is of a model that the rig doesn't have.
     """
+    faults = [*_unknown(tables, models)]
+    if faults:
+        raise RigError("\n".join(faults))
 
     def placed(table: ExistingTable) -> Existing:
         model = _model_of(table, models[table.kind])
@@ -34,18 +37,22 @@ def build_existing(
     return tuple(placed(table) for table in tables)
 
 
+def _unknown(
+    tables: Sequence[ExistingTable], models: Mapping[str, Sequence[Model]]
+) -> Iterator[str]:
+    """A sentence for each entry of a model that the rig doesn't have."""
+    for table in tables:
+        names = [model.table.name for model in models[table.kind]]
+        if table.model not in (None, *names):
+            yield (
+                f"existing {table.name!r}: model = {table.model!r} is none of the "
+                f"rig's {table.kind}s; name one of {', '.join(map(repr, names))}"
+            )
+
+
 def _model_of(table: ExistingTable, models: Sequence[Model]) -> Model:
     """The model that an entry names, or the first."""
-    if table.model is None:
-        return models[0]
-    for model in models:
-        if table.model == model.table.name:
-            return model
-    known = ", ".join(repr(model.table.name) for model in models)
-    raise RigError(
-        f"existing {table.name!r}: model = {table.model!r} is none of the rig's "
-        f"{table.kind}s; name one of {known}"
-    )
+    return next((m for m in models if m.table.name == table.model), models[0])
 
 
 def check_existing(required: Requirements) -> None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from geometry.devices import DeviceModel
 from planning.model.bodies import Body
 from planning.model.errors import RigError
+from planning.model.light.drawn_edges import DrawnEdges
 from planning.model.requirements import Stock
 from planning.rig.rig_tables import ParallelTable, PinholeTable, RigTable
 
@@ -88,13 +89,22 @@ def _faults(
             f"[[{key}]] have different mounts, and a list has one for all: write the "
             f"same [{key}.mount] for each, or none"
         )
-    drawn = {drawn_edges(t, d) for t, d in zip(tables, devices, strict=True)}
-    if key == "projector" and len(drawn) > 1:
-        yield (
-            "[[projector]] are focused differently, by distance or pupil; the blur of "
-            "drawn edges is one for all: write the same for each, or no "
-            "[projector.focus]"
-        )
+    first, *others = (drawn_edges(t, d) for t, d in zip(tables, devices, strict=True))
+    for place, other in enumerate(others, 2):
+        if key == "projector" and other != first:
+            yield (
+                f"[[projector]] {place} is {_focused(other)}, the first is "
+                f"{_focused(first)}; the blur of drawn edges is one for all: write a "
+                f"distance_mm and an f_number that give the same, or range_mm and no "
+                f"[projector.focus] for each"
+            )
+
+
+def _focused(drawn: DrawnEdges) -> str:
+    if drawn.focus_m is None:
+        return "without [projector.focus]"
+    at, pupil = 1e3 * drawn.focus_m, 1e3 * drawn.aperture_m
+    return f"focused at {at:g} mm through a pupil of {pupil:.4g} mm (f / f_number)"
 
 
 def _of_light(table: RigTable, key: str, many: bool) -> Iterator[str]:

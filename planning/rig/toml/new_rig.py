@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from geometry.devices import PinholeModel
@@ -37,6 +37,8 @@ class Answers:
     projector_px: tuple[int, int] = (1920, 1080)
     offset_percent: float = 0.0
     camera: str | None = None
+    camera_count: int | None = None
+    more_cameras: Sequence[tuple[str, int | None]] = ()
     sensor_px: tuple[int, int] | None = None
     pixel_um: float = 3.45
     focal_mm: float | None = None
@@ -81,7 +83,20 @@ def new_rig(answers: Answers) -> tuple[str, list[str]]:
     camera = _camera(answers, distance, chosen, finest_m)
     chosen += focused
     _focus_camera(camera, near, far, chosen)
-    return _text(answers, distance, projector, camera, chosen), chosen
+    cameras = [_of_count(camera, answers.camera_count)]
+    for name, count in answers.more_cameras:
+        like = replace(answers, camera=name)
+        other = _camera(like, distance, told := [f"of {name}:"], finest_m)
+        _focus_camera(other, near, far, told)
+        chosen.append(" ".join(told))
+        cameras.append(_of_count(other, count))
+    return _text(answers, distance, projector, cameras, chosen), chosen
+
+
+def _of_count(device: _Device, count: int | None) -> _Device:
+    if count is not None:
+        device.written = {**device.written, "count": count}
+    return device
 
 
 def _projector(answers: Answers) -> _Device:
@@ -186,7 +201,7 @@ def _text(
     answers: Answers,
     distance: float,
     projector: _Device,
-    camera: _Device,
+    cameras: Sequence[_Device],
     chosen: list[str],
 ) -> str:
     sheet = float(f"{_SHEET_MM * min(1.0, distance / 1e3):.2g}")
@@ -201,7 +216,11 @@ def _text(
         "# A name of `plan rigs devices`, or figures of your own.",
         *_table("projector", projector),
         '# K and distortion as measured by OpenCV: calibration = "camera.yml"',
-        *_table("camera", camera),
+        *(
+            line
+            for camera in cameras
+            for line in _table("camera", camera, listed=len(cameras) > 1)
+        ),
         "# From device to surface. Rooms, floors and mounting planes: [workspace];",
         "# without it devices may stand anywhere about the object.",
         "[placement]",
@@ -237,8 +256,8 @@ def _text(
     return "\n".join(lines)
 
 
-def _table(name: str, device: _Device) -> list[str]:
-    lines = [f"[{name}]"]
+def _table(name: str, device: _Device, *, listed: bool = False) -> list[str]:
+    lines = [f"[[{name}]]" if listed else f"[{name}]"]
     tables = {}
     for key, value in device.written.items():
         if isinstance(value, dict):

@@ -84,7 +84,15 @@ def changed(table: RigTable, tables: Mapping[str, Any]) -> RigTable:
     Raises:
         RigError: One line for each fault.
     """
-    return read_rig(lay_over(table.model_dump(exclude_unset=True), dict(tables)))
+    below, over = table.model_dump(exclude_unset=True), dict(tables)
+    for role in DEVICES:
+        given = over.get(role)
+        if isinstance(given, tuple):
+            over[role] = [*given]
+        elif isinstance(given, str) or {"name", "device"} & {*(given or ())}:
+            # A whole device takes the place of a list.
+            below.pop(f"more_{role}s", None)
+    return read_rig(lay_over(below, over))
 
 
 def _is_path(name: str | Path) -> bool:

@@ -94,7 +94,9 @@ export function whyNot(device, cause, at, { point, normal, steep, limits }) {
     const limit = limits[`${kind}_max_incidence`];
     const asks = Math.max(steeper(at.incidence), steeper(limit));
     const facing = at.incidence < Math.PI / 2;
-    const helps = facing ? `limits.${kind}_max_incidence_deg = ${asks} would do` : "it faces away; only another place helps";
+    // A rig file's limit stays below 90 degrees.
+    const help = asks < 90 ? `limits.${kind}_max_incidence_deg = ${asks} would do` : "as good as edge on; only another place helps";
+    const helps = facing ? help : "it faces away; only another place helps";
     return `incidence ${against(at.incidence, limit, degrees, true)}; ${helps}`;
   }
   if (cause === "tangent_angle") {

@@ -7,6 +7,9 @@ import numpy as np
 from planning.verify.audit.audit_case import AuditCase, DeviceKind
 from planning.verify.audit.audit_findings import AuditFindings
 
+# Of an equal share of the reference poses.
+_LEAST_SHARE = 0.25
+
 
 def audit_stock(case: AuditCase, findings: AuditFindings) -> None:
     """Check that no more devices of a model are taken than there are."""
@@ -45,7 +48,10 @@ def _audit_references(
     """Every model is among the reference poses, of which each is of a model."""
     of, n = case.plan.surface.models_of(kind.name), len(kind.models)
     key = f"surface.npz reference_{kind.name}_models"
-    there = np.unique(of).tolist()
+    there = np.bincount(of, minlength=n).tolist()
+    # As many poses are tried of each; clearance may cost some.
     findings.holds(
-        there == list(range(n)), key, f"names models {there}, the rig has {n}"
+        len(there) == n and min(there) >= _LEAST_SHARE * len(of) / n,
+        key,
+        f"{there} poses are of each model, of {n} in the rig",
     )

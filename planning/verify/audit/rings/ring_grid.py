@@ -175,8 +175,8 @@ def audit_creases(
 
 def strays(
     grid: RingGrid, creases: AuditCreases, max_incidence: float, tolerance_m: float
-) -> float:
-    """Return the share of chords between rings that err by more than a tolerance.
+) -> tuple[float, int]:
+    """Return the share of chords between rings that err by too much, and how many are.
 
     A chord joins two points of the surface one even gap apart; it errs by (h / even
     gap)^2 of that, h the gap of the rings at its middle. It counts if both ends and the
@@ -198,7 +198,7 @@ def strays(
     errors = grid.projector.light.chord_error(middles[:, None], ends)
     shrunk = (grid.projector.ring_gap(middles) / (ROWS * c[0])) ** 2
     over = (errors * shrunk[:, None])[counted] > tolerance_m
-    return float(over.mean()) if len(over) else 0.0
+    return (float(over.mean()) if len(over) else 0.0), len(over)
 
 
 def _creased(grid: RingGrid, creases: AuditCreases) -> Mask:
