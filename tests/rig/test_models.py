@@ -131,7 +131,7 @@ def test_projectors_of_a_list_are_focused_alike():
 
 def test_a_model_that_isnt_sharp_is_named():
     far = WIDE | {"range_mm": [2000.0, 3000.0]}
-    with pytest.raises(InfeasibleLimitsError, match="the camera 2 is sharp"):
+    with pytest.raises(InfeasibleLimitsError, match="which camera 2 is sharp"):
         mixed(NARROW, far)
 
 

@@ -223,9 +223,9 @@ def _warnings(path: Path, object_mm: float) -> Iterator[str]:
     for fit in (rig.fit(model, size) for model in models):
         if not fit.device.holds_ball(fit.radius_m, fit.middle_m):
             yield (
-                f"one view of the object takes {fit.images} images of the {fit.role} "
+                f"one view of the object takes {fit.images} images of {fit.called} "
                 f"side by side; {fit.advice()}"
             )
         elif not fit.is_sharp:
-            yield f"not all of it is sharp for the {fit.role}; {fit.advice()}"
+            yield f"not all of it is sharp for {fit.called}; {fit.advice()}"
     yield from (f"  {note}" for note in rig.notes())

@@ -59,6 +59,11 @@ class LensFit:
     size: ObjectSize
 
     @property
+    def called(self) -> str:
+        """What sentences call it: the camera, or of a list camera 2."""
+        return f"the {self.role}" if self.role.isalpha() else self.role
+
+    @property
     def radius_m(self) -> float:
         """Radius of the smallest ball that holds the object [m]."""
         return self.size.radius_m
@@ -280,7 +285,7 @@ def check_fields(fits: Sequence[LensFit]) -> None:
         away = fit.standoff_that_holds_m
         farther = "" if away is None else f", or this one from {1e3 * away:.0f} mm on"
         raise InfeasibleLimitsError(
-            f"the {fit.role} {fit.table.name} sees {across} mm at the standoff of "
+            f"{fit.called} {fit.table.name} sees {across} mm at the standoff of "
             f"{1e3 * fit.standoff_m:g} mm, and the object is {2e3 * fit.radius_m:.0f} "
             f"mm across: one view of it takes {fit.images} images, {_MOST_IMAGES} at "
             f"most. At that standoff {fit.advice()}{farther}; check the mesh's unit, "
@@ -293,7 +298,7 @@ def optics_notes(fits: Sequence[LensFit]) -> Iterator[str]:
     for fit in fits:
         if fit.share < _LEAST_SHARE:
             yield (
-                f"the object fills {percent(fit.share)} of the {fit.role}'s image, and "
+                f"the object fills {percent(fit.share)} of {fit.called}'s image, and "
                 f"a longer lens would use more of it: {fit.advice()}"
             )
 
@@ -303,7 +308,7 @@ def unsharp(fit: LensFit) -> str:
     low, high = (f"{1e3 * end:.0f}" for end in fit.device.range_m)
     return (
         f"placement.standoff_mm = {1e3 * fit.standoff_m:g} is outside the distances at "
-        f"which the {fit.role} is sharp, {low} to {high} mm; move the standoff, or set "
+        f"which {fit.called} is sharp, {low} to {high} mm; move the standoff, or set "
         f"the lens otherwise: {fit.lens_words(fit.device)} "
         f"{fit.focus_words(fit.device)}. `plan lens` says what suits an object"
     )
