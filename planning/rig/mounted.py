@@ -24,7 +24,7 @@ from planning.model.table_types import fault_words
 from planning.scene.placed_bodies import Device, kind_of
 from planning.scene.ranges.csv_rows import CsvRow, read_csv
 
-from .devices.models import Model
+from .devices.models import Model, named
 from .existing_tables import ExistingTable
 from .rig import Rig
 from .rig_tables import check_names
@@ -277,9 +277,8 @@ def _check_optics(device: Device, rig: Rig, path: str) -> None:
 
 def _model_of(device: Device, rig: Rig, path: str) -> Model:
     models = rig.models(kind_of(device))
-    for model in models:
-        if not device.model or device.model in (model.name, model.table.name):
-            return model
+    if (model := named(models, device.model)) is not None:
+        return model
     known = ", ".join(repr(model.table.name) for model in models)
     raise InputError(
         f"{path}: {device.id} is of the model {device.model!r}, rig {rig.name!r} has "

@@ -11,6 +11,9 @@ from planning.model.planned import PlannedCamera, PlannedProjector
 
 from .part import Interval, Matrix3, Part, Pose, Resolution, Vector3
 
+# Of the pixel that a viewing ray was told of, where it is imaged.
+_SAME_PX = 1.0
+
 
 def _are_radii(radii: tuple[float, ...]) -> tuple[float, ...]:
     if len(radii) < 2 or not np.all(np.diff(radii, prepend=0.0) > 0):
@@ -223,8 +226,9 @@ class CameraRecord(Part):
         )
         if any(self.distortion):
             width, height = self.resolution
-            ends = [(x, y) for x in (0, width - 1) for y in (0, height - 1)]
-            if not np.all(np.isfinite(device.rays(np.array(ends, dtype=np.float64)))):
+            ends = np.array([[x, y] for x in (0, width - 1) for y in (0, height - 1)])
+            off = np.abs(device.project(device.rays(ends)) - ends).max()
+            if not off <= _SAME_PX:
                 raise ValueError(
                     f"{self.id}: distortion = {self.distortion} folds the image: its "
                     f"corners see nothing"

@@ -1,5 +1,6 @@
 """What a plan was made from: `meshes`, `surface`, `rig` and `ranges`."""
 
+from collections.abc import Iterable
 from typing import Any, Literal
 
 import numpy as np
@@ -194,6 +195,17 @@ class RigRecord(Part):
     def models(self, kind: str) -> tuple[ModelRecord, ...]:
         """Return the models of a `projector` or a `camera`, the first one first."""
         return (getattr(self, kind), *getattr(self, f"more_{kind}s"))
+
+    def model_of(self, kind: str, name: str) -> ModelRecord:
+        """Return a model by the name that devices give; of none known the first."""
+        models = self.models(kind)
+        return next((model for model in models if model.name == name), models[0])
+
+    def figures_of(self, kind: str, names: Iterable[str]) -> list[FiguresRecord]:
+        """Return the figures of the models that devices name; of none the first's."""
+        taken = {self.model_of(kind, name).name for name in names}
+        models = self.models(kind)
+        return [m.figures for m in models if m.name in taken] or [models[0].figures]
 
 
 class ViolationRecord(Part):

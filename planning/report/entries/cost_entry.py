@@ -92,22 +92,12 @@ def _frame_time(
     cameras: Sequence[CameraRecord],
 ) -> float | None:
     """Of the longest exposure, planned or else stated, and of the slowest models."""
-    lamps, eyes = (
-        _figures(rig, "projector", projectors),
-        _figures(rig, "camera", cameras),
-    )
+    lamps = rig.figures_of("projector", (one.model for one in projectors))
+    eyes = rig.figures_of("camera", (one.model for one in cameras))
     exposures = [one.exposure.exposure_s for one in projectors if one.exposure]
     if not exposures:
         exposures = [1e-3 * each.exposure_ms for each in eyes if each.exposure_ms]
     return frame_time(_slowest(eyes), _slowest(lamps), max(exposures, default=None))
-
-
-def _figures(
-    rig: RigRecord, kind: str, records: Sequence[ProjectorRecord | CameraRecord]
-) -> list[FiguresRecord]:
-    """The figures of the models that devices are of."""
-    taken, models = {record.model for record in records}, rig.models(kind)
-    return [m.figures for m in models if m.name in taken] or [models[0].figures]
 
 
 def _slowest(figures: Sequence[FiguresRecord]) -> float | None:

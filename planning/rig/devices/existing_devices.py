@@ -8,7 +8,7 @@ from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.model.requirements import Requirements, Workspace
 from planning.rig.existing_tables import ExistingTable
 
-from .models import Model
+from .models import Model, named
 
 
 def build_existing(
@@ -28,7 +28,8 @@ def build_existing(
         raise RigError("\n".join(faults))
 
     def placed(table: ExistingTable) -> Existing:
-        model = _model_of(table, models[table.kind])
+        model = named(models[table.kind], table.model)
+        assert model is not None
         pose = rounded_pose(table.pose(workspace, model.device)).tolist()
         rows = tuple(tuple(row) for row in pose)
         body = Body.of(table.body) or model.body
@@ -42,17 +43,12 @@ def _unknown(
 ) -> Iterator[str]:
     """A sentence for each entry of a model that the rig doesn't have."""
     for table in tables:
-        names = [model.table.name for model in models[table.kind]]
-        if table.model not in (None, *names):
+        if named(models[table.kind], table.model) is None:
+            names = [model.table.name for model in models[table.kind]]
             yield (
                 f"existing {table.name!r}: model = {table.model!r} is none of the "
                 f"rig's {table.kind}s; name one of {', '.join(map(repr, names))}"
             )
-
-
-def _model_of(table: ExistingTable, models: Sequence[Model]) -> Model:
-    """The model that an entry names, or the first."""
-    return next((m for m in models if m.table.name == table.model), models[0])
 
 
 def check_existing(required: Requirements) -> None:

@@ -57,6 +57,13 @@ def models_of(
     )
 
 
+def named(models: Sequence[Model], name: str | None) -> Model | None:
+    """Return the model that a device names; the first of no name, None of another."""
+    if not name:
+        return models[0]
+    return next((model for model in models if model.table.name == name), None)
+
+
 def stock_of(kind: str, models: Sequence[Model]) -> Iterator[Stock]:
     """Yield how many there are of each of several models that are counted."""
     for model in models:

@@ -66,10 +66,6 @@ class DeviceKind:
         """Whether there are several models, and so many of one."""
         return len(self.models) > 1 and any(model.count for model in self.models)
 
-    def model_of(self, name: str) -> ModelRecord:
-        """Return the model of a device by its name; of none that is known the first."""
-        return next((m for m in self.models if m.name == name), self.models[0])
-
 
 @dataclass(frozen=True, eq=False)
 class AuditCase:

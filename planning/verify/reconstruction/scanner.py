@@ -24,7 +24,7 @@ from .calibration import (
     calibrate_camera,
     calibrate_projector,
 )
-from .patterns.defocus import Defocus, defocus_of, model_of
+from .patterns.defocus import Defocus, defocus_of
 
 # Rings that run more steeply along the viewing ray cross steps between surfaces, unless
 # the plan counts on surface seen at such incidence [rad].
@@ -119,7 +119,7 @@ class Scanner:
             tuple(
                 replace(
                     calibrate_camera(camera),
-                    focus=defocus_of(model_of(plan, "camera", camera.model)),
+                    focus=defocus_of(document.rig.model_of("camera", camera.model)),
                 )
                 for camera in plan.cameras
             ),
@@ -174,6 +174,6 @@ class Scanner:
 
 
 def _projector(plan: RigPlan, projector: PlannedProjector) -> ProjectorCalibration:
-    model = model_of(plan, "projector", projector.model)
+    model = plan.document.rig.model_of("projector", projector.model)
     response = Response(model.figures.response or 1.0)
     return replace(calibrate_projector(projector), response=response)

@@ -6,7 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from planning.model.errors import PlanFileError
 from planning.model.plan import RigPlan
+from planning.report.summary.device_lines import used_up
 from planning.verify.audit.audit import audit_plan
 
 
@@ -83,3 +85,32 @@ def test_every_model_is_among_the_reference_poses(of_models):
     surface = replace(of_models.surface, reference_camera_models=first)
     told = audit_plan(RigPlan(of_models.document, surface), n_samples=1500).failures
     assert any("reference_camera_models: [" in line for line in told)
+
+
+def test_models_that_the_rig_lacks_are_refused_as_a_file(of_models, tmp_path):
+    surface = of_models.surface
+    beyond = np.full(len(surface.reference_cameras), 2)
+    RigPlan(of_models.document, replace(surface, reference_camera_models=beyond)).save(
+        tmp_path / "plan.json"
+    )
+    with pytest.raises(PlanFileError, match=r"names models 2 to 2, the rig has 2"):
+        RigPlan.load(tmp_path / "plan.json")
+
+
+def test_a_lens_that_folds_its_image_is_refused(of_models):
+    document = of_models.to_document()
+    document["cameras"][0]["distortion"] = [0.0, 0.0, -30.0, 0.0, 0.0]
+    with pytest.raises(PlanFileError, match="folds the image"):
+        RigPlan.from_document(document, of_models.surface)
+
+
+def test_more_of_a_counted_model_is_what_helps(handmade):
+    """Of one model, too: a larger limit would find no other camera."""
+    document = handmade.build_plan("diverging").to_document()
+    document["rig"]["camera"] |= {"name": "eye", "count": len(document["cameras"])}
+    plan = RigPlan.from_document(document, handmade.build_plan("diverging").surface)
+    assert used_up(plan.document, "camera") == f"eye ({len(document['cameras'])})"
+    assert used_up(plan.document, "projector") == ""
+    document["rig"]["camera"]["count"] += 1
+    plan = RigPlan.from_document(document, plan.surface)
+    assert used_up(plan.document, "camera") == ""

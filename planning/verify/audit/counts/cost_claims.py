@@ -2,7 +2,6 @@
 
 import math
 
-from planning.model.document.input_records import FiguresRecord
 from planning.model.document.plan_document import CostRecord
 from planning.model.plan import RigPlan
 from planning.verify.audit.audit_case import AuditCase
@@ -61,7 +60,9 @@ def _frames(plan: RigPlan, n_cameras: int, *, left_out: bool = False) -> int:
 
 def _frame_time(plan: RigPlan) -> float | None:
     """Refreshes of the slowest projector until every camera is ready again."""
-    cameras, lamps = (_figures_of(plan, kind) for kind in ("camera", "projector"))
+    rig = plan.document.rig
+    cameras = rig.figures_of("camera", (one.model for one in plan.cameras))
+    lamps = rig.figures_of("projector", (one.model for one in plan.projectors))
     rate = min(figures.frame_rate_hz or 0.0 for figures in cameras)
     refresh = min(figures.frame_rate_hz or 0.0 for figures in lamps)
     if not (rate > 0.0 and refresh > 0.0):
@@ -73,13 +74,6 @@ def _frame_time(plan: RigPlan) -> float | None:
     longest = max(1.0 / rate, exposed)
     refreshes = longest * refresh * (1.0 - _RELATIVE)
     return max(math.ceil(refreshes), 1) / refresh if math.isfinite(refreshes) else None
-
-
-def _figures_of(plan: RigPlan, kind: str) -> list[FiguresRecord]:
-    """The figures of the models that the plan's devices are of."""
-    models = plan.document.rig.models(kind)
-    taken = {device.model for device in getattr(plan, f"{kind}s")}
-    return [m.figures for m in models if m.name in taken] or [models[0].figures]
 
 
 def _total(cost: CostRecord, acquired: float | None, pixels: float) -> float | None:

@@ -24,7 +24,6 @@ def audit_bodies(case: AuditCase, findings: AuditFindings) -> None:
     """Check that each device's body is that of the rig, or of its own entry there."""
     plan, rig = case.plan, case.plan.document.rig
     by_name = {str(table.get("name")): table.get("body") for table in rig.existing}
-    kinds = {kind.name: kind for kind in case.kinds}
     for kind in case.kinds:
         for model in kind.models:
             below = findings.at(f"rig.{kind.name}.body")
@@ -38,7 +37,7 @@ def audit_bodies(case: AuditCase, findings: AuditFindings) -> None:
         key = f"requirements.existing.{place}"
         bodies.append((key, device.kind, device.name, device.model, device.body))
     for key, kind, name, model, body in bodies:
-        stated = by_name.get(name) or kinds[kind].model_of(model).figures.body
+        stated = by_name.get(name) or rig.model_of(kind, model).figures.body
         _audit_body(body, stated, findings.at(f"{key}.body"))
 
 

@@ -9,6 +9,7 @@ from geometry.arrays import Array
 from geometry.devices import PinholeModel
 from planning.model.bodies import Existing
 from planning.model.document.device_records import CameraRecord, ProjectorRecord
+from planning.model.document.input_records import RigRecord
 from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
@@ -48,7 +49,7 @@ def audit_devices(case: AuditCase, findings: AuditFindings) -> None:
             f"{len(names)} devices, requirements.max_{key} allows {kind.most}",
         )
         for record in kind.records:
-            _audit_model(kind, record, findings.at(record.id))
+            _audit_model(kind, record, document.rig, findings.at(record.id))
             poses, below = np.array([record.world_from_device]), findings.at(record.id)
             audit_poses("world_from_device", poses, below)
             position = poses[:, :3, 3]
@@ -89,13 +90,16 @@ def _audit_last_ring(
 
 
 def _audit_model(
-    kind: DeviceKind, record: ProjectorRecord | CameraRecord, findings: AuditFindings
+    kind: DeviceKind,
+    record: ProjectorRecord | CameraRecord,
+    rig: RigRecord,
+    findings: AuditFindings,
 ) -> None:
     names = [model.name for model in kind.models] if len(kind.models) > 1 else [""]
     findings.holds(
         record.model in names, "model", f"{record.model!r} is none of the rig's {names}"
     )
-    model = kind.model_of(record.model)
+    model = rig.model_of(kind.name, record.model)
     for name in _MODEL:
         if name in type(record).model_fields:
             claimed, truth = getattr(record, name), getattr(model, name)

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from planning.model.document.input_records import ModelRecord
-from planning.model.plan import RigPlan
 from planning.verify.reconstruction.arrays import Array
 
 
@@ -30,12 +29,6 @@ class Defocus:
             c = A |z / z_0 - 1|
         """
         return 0.25 * self.aperture_m * np.abs(depth / self.focus_m - 1.0)
-
-
-def model_of(plan: RigPlan, role: str, name: str) -> ModelRecord:
-    """Return the model of a `projector` or a `camera`; of no name the first."""
-    models = plan.document.rig.models(role)
-    return next((model for model in models if model.name == name), models[0])
 
 
 def defocus_of(model: ModelRecord) -> Defocus | None:
