@@ -9,6 +9,7 @@ from geometry.arrays import Array
 from geometry.devices import ParallelModel, PinholeModel
 
 from .bodies import Body
+from .light.dense_code import DenseCode
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,13 +23,14 @@ class PlannedProjector:
         world_from_ring: Pose of the ring frame, shape (4, 4) [m].
         device: Its optics.
         ring_radii: Tangents R = x/z (diverging) or radii in [m] (parallel) of the ring
-            edges, increasing, shape (n_rings,).
+            edges, increasing, shape (n_rings,); of a dense code none.
         existing: Name of the device that stands already; empty: it is planned.
         body: Its housing; None: it takes no room.
         pattern: What it shows, as in `Requirements`.
         keeps_rings: Whether its rings stay as they are.
         exposure_s: What cameras expose each of its frames for [s]; None: not planned.
         model: Which of the rig's models it is; empty where there is one.
+        code: What a `dense` pattern codes its pixels by.
     """
 
     id: str
@@ -43,6 +45,7 @@ class PlannedProjector:
     keeps_rings: bool = False
     exposure_s: float | None = None
     model: str = ""
+    code: DenseCode | None = None
 
 
 def code_bits(n_rings: int) -> int:

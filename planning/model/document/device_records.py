@@ -1,12 +1,13 @@
 """`projectors`, `cameras` and `baselines` of a plan file."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator
+from pydantic import AfterValidator, model_validator
 
 from geometry.devices import ParallelModel, PinholeModel
 from planning.model.bodies import Body
+from planning.model.light.dense_code import DenseCode
 from planning.model.planned import PlannedCamera, PlannedProjector
 
 from .part import Interval, Matrix3, Part, Pose, Resolution, Vector3
@@ -134,6 +135,7 @@ class ProjectorRecord(Part):
         rings: None: the run was cut before they were spaced.
         exposure: Absent where the rig says nothing of light.
         model: Name of its model, where the rig has several or counts them.
+        code: Of the pattern `dense`, which has no rings.
     """
 
     id: str
@@ -145,7 +147,7 @@ class ProjectorRecord(Part):
     pixel_pitch_m: float | None
     range_m: Interval
     beam_radius: float | None
-    ring_radii: Annotated[tuple[float, ...], AfterValidator(_are_radii)]
+    ring_radii: tuple[float, ...]
     min_margin_rad: float | None
     lit_area_m2: float
     body: Body | None = None
@@ -156,6 +158,15 @@ class ProjectorRecord(Part):
     ring_shares: RingSharesRecord | None = None
     exposure: ExposureRecord | None = None
     model: str = ""
+    code: DenseCode | None = None
+
+    @model_validator(mode="after")
+    def _shows_something(self) -> Self:
+        if self.code is None:
+            _are_radii(self.ring_radii)
+        elif self.ring_radii:
+            raise ValueError("ring_radii and code exclude each other: write one")
+        return self
 
     def planned(self) -> PlannedProjector:
         """Return the projector.
@@ -172,8 +183,10 @@ class ProjectorRecord(Part):
             np.array(self.ring_radii),
             self.name if self.existing else "",
             self.body,
+            pattern="rings" if self.code is None else "dense",
             exposure_s=None if self.exposure is None else self.exposure.exposure_s,
             model=self.model,
+            code=self.code,
         )
 
     def _device(self) -> PinholeModel | ParallelModel:
@@ -250,6 +263,7 @@ def projector_record(
         ring_radii=tuple(projector.ring_radii.tolist()),
         min_margin_rad=min_margin_rad,
         lit_area_m2=lit_area_m2,
+        **({} if projector.code is None else {"code": projector.code}),
         **_described(projector, ProjectorRecord),
     )
 
