@@ -29,6 +29,11 @@ from planning.scene.ranges.ranged_body import RangedBody
 from planning.verify.verification import Verification, verify_plan
 
 from .steps.prepare import prepared, request_of, standing_devices
+from .steps.redundant import (
+    check_redundancy,
+    one_more_for_losses,
+    placed_redundantly,
+)
 from .steps.stages import (
     as_they_stand,
     bounded_cameras,
@@ -64,6 +69,8 @@ def plan_rig(
     up: str | None = None,
     ring_axis: RingAxis | None = None,
     robust: float | None = None,
+    views: int | None = None,
+    survive: int = 0,
     seed: int = 0,
     threads: int | None = None,
     check: bool = True,
@@ -107,6 +114,10 @@ def plan_rig(
             stand where errors are smallest, or `auto`: centred where that takes no
             more cameras and the check is passed; None: the rig's.
         robust: Share of drawn rigs that meet the requirements; None: none is drawn.
+        views: Different pairs of projector and camera, at least, that measure what
+            counts as covered; None: one.
+        survive: Devices, 0 or 1, of which any may be lost: what is left still meets
+            the requirements.
         seed: The same seed gives the same plan.
         threads: Worker threads; no result depends on it. None: one for each core.
         check: Whether the plan is audited and reconstructed from pixels.
@@ -150,6 +161,8 @@ def plan_rig(
         up=up,
         ring_axis=ring_axis,
         robust=robust,
+        views=views,
+        survive=survive,
     )
     # BLAS must not split sums differently with another number of threads.
     with (
@@ -167,6 +180,7 @@ def plan_rig(
             mounted=fixed,
             evaluates=evaluates,
         )
+        check_redundancy(request)
         planned = _evaluated if evaluates else robustly(_planned)
         plan, partial = planned(request, clock, keep)
         if check and not plan.document.truncated:
@@ -232,6 +246,7 @@ def _planned(
             partial = bounded_cameras(partial, clock)
             plan = write_plan(partial, clock)
             larger = with_free_axes(partial, plan, clock)
+            larger = larger or one_more_for_losses(partial, plan, clock)
             larger = larger or one_device_more(partial, plan, clock)
             if larger is None:
                 return plan, partial
@@ -264,6 +279,8 @@ def _first_plan(request: PlanRequest, clock: Stopwatch) -> PartialPlan:
     check_fields(request.rig.fits(request.mesh))
     ready = prepared(request, clock)
     stage = bounded_projectors(ready, first_projectors(ready, clock), clock)
+    if ready.scene.requirements.redundancy is not None:
+        return placed_redundantly(ready, stage, clock)
     return placed(ready, stage, clock)
 
 

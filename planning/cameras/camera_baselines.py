@@ -15,12 +15,14 @@ from planning.cameras.baselines.widest_baselines import (
     WidestBaselines,
 )
 from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.proofs.losses import PairDemand
 from planning.proofs.quotas import Quotas, RegionFloors
 from planning.scene.bodies.clearance import lacks_clearance
 from planning.scene.draws import DRAWS
 from planning.scene.limits.calibration_terms import surface_deviation
 from planning.scene.measurability import expected_noise_px
 from planning.scene.measured import LitSamples, lit_samples, measured_by
+from planning.scene.measuring_pairs import measuring_pairs
 from planning.scene.placed_bodies import moves_bodies
 from planning.scene.scene import Scene
 
@@ -30,6 +32,8 @@ _Check = Callable[[NDArray[np.float64]], bool]
 # What candidates cover is the measure of all claims: cameras may measure this share of
 # it more, no further. Where candidates cover nearly all that is lit none can.
 _BEYOND, _NEARLY = 0.002, 0.97
+# Of what pairs must measure after a loss, kept to spare for fresh samples.
+_MORE = 1.01
 # Programs times cameras, which take that much longer: the first moves gain most.
 _CAMERA_PROGRAMS = 180
 
@@ -154,6 +158,7 @@ def widen_baselines(
         max_programs = max(_CAMERA_PROGRAMS // max(len(cameras), 1), 4)
     least_lit = samples.count_lit(cameras)
     checks = _keeping_floors(samples, cameras, least_lit)
+    checks += _keeping_pairs(samples, cameras)
     checks += [_confirming(samples, cameras)] if confirmed else []
     search = BaselineSearch(
         cameras,
@@ -187,6 +192,29 @@ def _keeping_floors(
     lit = np.ones(len(samples.lit.target), dtype=bool)
     floors = Quotas.of(regions, lit, 0.0, spare=1.0).as_far_as(measured(cameras))
     return [lambda poses: floors.enough(measured(at_poses(cameras, poses)))]
+
+
+def _keeping_pairs(
+    samples: BaselineSamples, cameras: Sequence[PlannedCamera]
+) -> list[_Check]:
+    """Whether what pairs must measure, after every loss, stays; empty: one suffices.
+
+    What counts is a share of what is lit in each case, as far as it is measured now.
+    """
+    asked = samples.scene.requirements.redundancy
+    if asked is None:
+        return []
+    scene, lit, share = samples.scene, samples.lit, samples.scene.requirements.coverage
+    regions = RegionFloors.of(scene, lit.target)
+    left = [np.any(np.delete(lit.lit, p, axis=1), axis=1) for p in range(lit.lit.shape[1])]
+    reached = np.stack([lit.lit.any(axis=1), *(left if asked.survive else [])], axis=1)
+    demand = PairDemand.of(asked, regions, reached, share * _MORE, spare=1.0)
+    kept = demand.kept(measuring_pairs(scene, cameras, lit))
+    return [
+        lambda poses: demand.upheld(
+            kept, measuring_pairs(scene, at_poses(cameras, poses), lit)
+        )
+    ]
 
 
 def _confirming(samples: BaselineSamples, cameras: Sequence[PlannedCamera]) -> _Check:

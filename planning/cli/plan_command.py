@@ -38,6 +38,8 @@ _ASKED = (
     "up",
     "ring_axis",
     "robust",
+    "views",
+    "survive",
     "seed",
     "prove",
     "cameras_by",

@@ -10,8 +10,10 @@ from scipy.spatial.transform import Rotation, Slerp
 from geometry.poses import inverse
 from planning.model.device_poses import moved_to
 from planning.model.planned import PlannedProjector
+from planning.proofs.losses import light_kept, still_lit
 from planning.proofs.quotas import Quotas
 from planning.scene.bodies.clearance import lacks_clearance
+from planning.scene.draws import DRAWS
 from planning.scene.lighting import lit_margins, lit_stages
 from planning.scene.limits import projector_limits
 from planning.scene.patterns import RingPattern
@@ -24,6 +26,7 @@ from solvers.poses.pose_problem import PoseProgram, pose_margins
 from solvers.poses.pose_program import pose_slack, solve_pose
 
 from .fewest_projectors import confirms
+from .loss_confirmation import confirms_losses
 from .projector_stage import ProjectorStage
 from .share_margin import lit_by_any, margin_at_share, to_keep, widest_between
 
@@ -38,6 +41,8 @@ _MAX_MOVE_M = 0.3
 _SEARCHED = 2000
 # Of the samples that candidates reach: so many others a pose may light.
 _STRAY = 0.002
+# Of all that must stay lit after a loss, to spare.
+_SPARE = 0.01
 # Draw of samples that no cover saw.
 _CONFIRMING = 9
 
@@ -56,7 +61,11 @@ def widen_margins(scene: Scene, stage: ProjectorStage) -> tuple[PlannedProjector
     deny it and not the beginning, nothing is moved.
     """
     samples, reached = stage.candidates.samples, stage.candidates.reached
+    redundancy = scene.requirements.redundancy
     state = _Lit(scene, samples, list(stage.projectors), reached)
+    if survives := bool(redundancy and redundancy.survive):
+        aims = stage.candidates.cover.aims
+        state.kept_after_loss = light_kept(_spared(aims), np.isfinite(state.margin))
     # With too few devices, what they light is what counts.
     quotas = stage.candidates.cover.aims.as_far_as(lit_by_any(state.margin))
     required, kept = quotas.total, to_keep(state.margin, quotas)
@@ -77,7 +86,15 @@ def widen_margins(scene: Scene, stage: ProjectorStage) -> tuple[PlannedProjector
     wider, chosen = tuple(state.projectors), stage.projectors
     held = confirms(stage.candidates, wider, _CONFIRMING)
     lost = not held and confirms(stage.candidates, chosen, _CONFIRMING)
+    if survives and not lost:
+        fresh = scene.target_samples(DRAWS.redundant_projectors.later(_CONFIRMING))
+        lost = not confirms_losses(stage.candidates, wider, fresh)
     return chosen if lost else wider
+
+
+def _spared(quotas: Quotas) -> Quotas:
+    """Some more of all, so that fresh samples should confirm what a loss leaves."""
+    return replace(quotas, total=int(np.ceil((1.0 + _SPARE) * quotas.total)))
 
 
 def _between(state: "_Lit", quotas: Quotas, kept: Quotas, n_lattice: int) -> "_Lit":
@@ -97,17 +114,22 @@ def _between(state: "_Lit", quotas: Quotas, kept: Quotas, n_lattice: int) -> "_L
     wider = margin_at_share(moved.margin, required) > margin_at_share(
         state.margin, required
     )
-    return moved if wider and kept.enough(lit_by_any(moved.margin)) else state
+    held = kept.enough(lit_by_any(moved.margin)) and moved.survives(moved.margin)
+    return moved if wider and held else state
 
 
 @dataclass(eq=False)
 class _Lit:
-    """Projectors as they stand, and the margin of what each lights."""
+    """Projectors as they stand, and the margin of what each lights.
+
+    `kept_after_loss` must stay lit without each projector; empty: none may be lost.
+    """
 
     scene: Scene
     samples: Target
     projectors: list[PlannedProjector]
     reached: NDArray[np.bool_]
+    kept_after_loss: tuple[Quotas, ...] = ()
     margin: NDArray[np.float64] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -117,6 +139,12 @@ class _Lit:
         """The same projectors, on some of the samples."""
         samples, reached = self.samples.take(chosen), self.reached[chosen]
         return replace(self, samples=samples, reached=reached)
+
+    def survives(self, margin: NDArray[np.float64]) -> bool:
+        """Whether each loss leaves what it must; always where none is to be stood."""
+        if not self.kept_after_loss:
+            return True
+        return still_lit(self.kept_after_loss, np.isfinite(margin))
 
     def with_all(self, projectors: list[PlannedProjector]) -> "_Lit":
         """Other projectors, on the same samples."""
@@ -183,7 +211,7 @@ def _improve(state: _Lit, p: int, required: int, kept: Quotas) -> bool:
         if margin is None:
             continue
         wide = margin_at_share(margin, required) >= level
-        if wide and kept.enough(lit_by_any(margin)):
+        if wide and kept.enough(lit_by_any(margin)) and state.survives(margin):
             state.projectors[p], state.margin = offered, margin
             return True
     return False

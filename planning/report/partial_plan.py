@@ -10,6 +10,7 @@ from planning.model.document.certificates import CamerasBy
 from planning.model.document.device_records import AxisTaken, RingAxis
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.projectors.projector_stage import ProjectorStage
+from planning.redundancy.redundant_counts import RedundantCount
 from planning.rig.mounted import Mounted
 from planning.rig.range_guard import Guard
 from planning.rig.rig import Rig
@@ -86,7 +87,8 @@ class PartialPlan:
     """All stages as far as they came; enough to write a plan from.
 
     `projectors` have evenly spaced rings about `axes`; `rings` holds those that cameras
-    let finer. `other_axes` are the projectors with other axes, to compare.
+    let finer. `other_axes` are the projectors with other axes, to compare. `redundant`
+    says what redundancy takes of projectors and cameras; None: it isn't asked for.
     """
 
     ready: Prepared
@@ -98,6 +100,7 @@ class PartialPlan:
     truncated: bool = False
     rings: RingStage | None = None
     other_axes: tuple[PlannedProjector, ...] = ()
+    redundant: tuple[RedundantCount, RedundantCount] | None = None
 
     @property
     def request(self) -> PlanRequest:

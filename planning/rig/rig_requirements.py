@@ -12,6 +12,7 @@ from planning.model.calibration_errors import AS_PLANNED
 from planning.model.errors import InfeasibleLimitsError, InputError
 from planning.model.light.drawn_edges import DrawnEdges
 from planning.model.light.light_budget import LightBudget
+from planning.model.redundancy import Redundancy
 from planning.model.requirements import (
     CameraLimits,
     CheckLimits,
@@ -28,6 +29,8 @@ from .wishes import Wishes
 _Limits = TypeVar("_Limits", ProjectorLimits, CameraLimits, TriangulationLimits)
 
 _WARN_INCIDENCE_DEG = 70.0
+# Pairs that may be asked for of each point: more are no redundancy but another rig.
+MOST_VIEWS = 8
 
 _UP_VECTORS = {
     **{"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)},
@@ -91,6 +94,7 @@ def build_requirements(
         workspace=workspace,
         region_coverage=_share("region_coverage", wishes, shares, or_none=True),
         region_share=shares.region_share,
+        redundancy=_redundancy(wishes),
     )
 
 
@@ -109,6 +113,28 @@ def limit_notes(limits: LimitsTable) -> tuple[str, ...]:
             f"and at 84 only 0.6 of the surface is measured"
         )
     return tuple(sentences)
+
+
+def _redundancy(wishes: Wishes) -> Redundancy | None:
+    """Return what is asked beyond one pair; None: nothing.
+
+    Raises:
+        InputError: If it can't be asked, or not together with something else.
+    """
+    views, survive = wishes.views or 1, wishes.survive
+    if not 1 <= views <= MOST_VIEWS:
+        raise InputError(f"views = {views} must be from 1 to {MOST_VIEWS}")
+    if survive not in (0, 1):
+        raise InputError(f"survive = {survive} must be 0 or 1")
+    asked = Redundancy(views, survive)
+    if not asked.asks:
+        return None
+    if wishes.robust is not None:
+        raise InputError(
+            f"robust = {wishes.robust:g} with views = {views}, survive = {survive}: "
+            f"rigs are drawn for plans that measure once; ask for one of them"
+        )
+    return asked
 
 
 def _check_drawn(table: RigTable, quantile: float) -> None:

@@ -17,6 +17,7 @@ class Wishes:
     As many cameras as needed where `max_cameras` is None. The target is then that of
     dominant regions, and the whole surface of a body known by its ranges. `robust` is
     the share of drawn rigs that must meet what is asked; None: none is drawn.
+    `views` pairs at least measure what counts, and any `survive` devices may be lost.
     """
 
     max_projectors: int
@@ -32,3 +33,5 @@ class Wishes:
     up: str | None = None
     ring_axis: RingAxis | None = None
     robust: float | None = None
+    views: int | None = None
+    survive: int = 0

@@ -27,7 +27,7 @@ _GROUPS = {
     ),
     "How well": (
         *("dominant_coverage", "coverage", "min_reachable", "region_coverage"),
-        *("accuracy_mm", "accuracy_of", "robust"),
+        *("accuracy_mm", "accuracy_of", "robust", "views", "survive"),
     ),
     "How it is sought": (
         *("cameras_by", "prove", "seed", "time_limit", "threads", "no_check"),
@@ -198,6 +198,21 @@ class GroupedCommand(click.Command):
     metavar="Q",
     help="Tighten the requirements until this share of drawn rigs meets them, mounted "
     "and calibrated as the rig's [mounting] and [calibration] say [default: none].",
+)
+@click.option(
+    "--views",
+    type=click.IntRange(1, 8),
+    metavar="K",
+    help="Count as covered what at least K different pairs of projector and camera "
+    "measure [default: 1].",
+)
+@click.option(
+    "--survive",
+    type=click.IntRange(0, 1),
+    default=0,
+    metavar="N",
+    help="1: when any one projector or camera is lost, the others still meet the "
+    "requirements [default: 0].",
 )
 @click.option(
     "--cameras-by",

@@ -18,6 +18,11 @@ from .cause_words import causes_line
 from .check_lines import error_words, unchecked
 from .device_lines import axis_name, models_line, standing, used_up
 from .proof_lines import user_selection
+from .redundancy_lines import (
+    proof_words,
+    redundancy_cost,
+    worst_losses,
+)
 from .region_lines import worst_region
 from .robust_lines import robust_cost
 from .shortfall import Shortfall, missing
@@ -46,6 +51,7 @@ def brief(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
         *([("MODELS", models, 3)] if models else []),
         *_measured(plan),
         *_fewest(plan),
+        *_redundant(plan),
         *_robust(plan),
         *_missed(plan, short),
         *_check(plan),
@@ -179,6 +185,11 @@ def _fewest(plan: RigPlan) -> Iterator[_Block]:
         return
     proofs = plan.document.certificates
     kinds = {"projector": proofs.projectors, "camera": proofs.cameras}
+    if (redundant := plan.document.redundancy) is not None:
+        for label, kind in zip(("FEWEST", ""), kinds, strict=True):
+            if count := getattr(redundant, f"{kind}s"):
+                yield label, proof_words(kind, count), 2
+        return
     if all(_over_all(proof) for proof in kinds.values()):
         counts = [count_words(proof.count, kind) for kind, proof in kinds.items()]
         yield (
@@ -190,6 +201,15 @@ def _fewest(plan: RigPlan) -> Iterator[_Block]:
         return
     for label, (kind, proof) in zip(("FEWEST", ""), kinds.items(), strict=True):
         yield label, _proved(kind, proof, used_up(plan.document, kind)), 2
+
+
+def _redundant(plan: RigPlan) -> Iterator[_Block]:
+    """Say what any one loss leaves, and what it costs to stand it."""
+    record, asked = plan.document.redundancy, plan.requirements.redundancy
+    if record is None or asked is None:
+        return
+    parts = (worst_losses(plan), redundancy_cost(record, asked))
+    yield "LOSSES" if asked.survive else "VIEWS", "; ".join(filter(None, parts)), 2
 
 
 def _robust(plan: RigPlan) -> Iterator[_Block]:

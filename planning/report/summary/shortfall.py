@@ -9,12 +9,14 @@ from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
 from planning.model.requirements import Requirements
 from planning.model.words import area_words, percent
+from planning.report.redundancy_claims import falls_short_after
 from planning.scene.limits.limit import causes
 from planning.scene.limits.pair_limits import MEASURED_LIMITS
 from planning.scene.limits.projector_limits import PROJECTOR_LIMITS
 
 from .cause_words import areas_line, causes_line, rounded_down
 from .device_lines import used_up
+from .redundancy_lines import lit_share, measured_share, pairs_words
 from .region_lines import floor_shortfalls
 
 # What accepts the one requirement that a plan misses.
@@ -64,6 +66,7 @@ def _missing(plan: RigPlan) -> Iterator[Shortfall]:
     yield from _reachable(plan.document, required)
     yield from _covered(plan.document, required)
     yield from _floors(plan)
+    yield from _redundant(plan)
     yield from _robust(plan.document, required)
     if check is not None and not check.passed:
         for failure in check.failures:
@@ -74,6 +77,38 @@ def _missing(plan: RigPlan) -> Iterator[Shortfall]:
 def _floors(plan: RigPlan) -> Iterator[Shortfall]:
     for figure, missed, helps in floor_shortfalls(plan):
         yield Shortfall(figure, missed, helps, ", or ")
+
+
+def _redundant(plan: RigPlan) -> Iterator[Shortfall]:
+    """Whether what is left after each loss meets what is asked of all."""
+    record, required = plan.document.redundancy, plan.requirements
+    asked = required.redundancy
+    if record is None or asked is None:
+        return
+    helps = tuple(
+        f"--max-{kind}s {count.needed}"
+        for kind in ("projector", "camera")
+        if (count := getattr(record, f"{kind}s")) and count.needed > count.count
+    )
+    for loss in record.losses:
+        dark, short = falls_short_after(loss, required)
+        if not (dark or short):
+            continue
+        where = f"without {loss.lost}" if loss.lost else "with all devices there"
+        by = f" by {pairs_words(asked.views)}" if asked.views > 1 else ""
+        figure = (
+            f"{where} lit {percent(lit_share(loss))} and measured{by} "
+            f"{percent(measured_share(loss))} of what can be"
+        )
+        regions = ", ".join(map(str, loss.floors_missed))
+        floors = f"; region {regions} falls below its floor" if regions else ""
+        yield Shortfall(
+            figure,
+            f"{figure}{floors}, {percent(required.dominant_coverage)} and "
+            f"{percent(required.coverage)} are required after any loss (--survive, "
+            f"--views).",
+            helps,
+        )
 
 
 def _robust(document: PlanDocument, requirements: Requirements) -> Iterator[Shortfall]:

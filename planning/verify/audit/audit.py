@@ -26,6 +26,10 @@ from planning.verify.audit.counts.table_claims import (
 from planning.verify.audit.coverage.area_claims import audit_areas, recomputed_areas
 from planning.verify.audit.coverage.floor_claims import audit_floors
 from planning.verify.audit.coverage.inside_claims import audit_inside
+from planning.verify.audit.coverage.redundancy_claims import (
+    audit_redundancy,
+    unmet_after_losses,
+)
 from planning.verify.audit.coverage.region_claims import audit_margins, audit_regions
 from planning.verify.audit.coverage.robust_claims import audit_robust
 from planning.verify.audit.coverage.sigma_claims import audit_sigma
@@ -61,6 +65,7 @@ _CLAIMS = (
     audit_inside,
     audit_sigma,
     audit_robust,
+    audit_redundancy,
     audit_margins,
     audit_regions,
     audit_floors,
@@ -157,4 +162,4 @@ def _unmet_requirements(plan: RigPlan) -> tuple[str, ...]:
         f"m², less than {limits.region_coverage:g} of either"
         for region in plan.document.regions
         if (areas := region.coverage) is not None and areas.floor == "missed"
-    )
+    ) + tuple(unmet_after_losses(plan))

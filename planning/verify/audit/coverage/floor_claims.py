@@ -46,7 +46,7 @@ def audit_floors(case: AuditCase, findings: AuditFindings) -> None:
     Plans from before have none of these, and no floors.
     """
     plan, large = case.plan, case.large_regions
-    parts = _parts(case) if any(r.coverage for r in plan.document.regions) else ()
+    parts = region_parts(case) if any(r.coverage for r in plan.document.regions) else ()
     share = plan.requirements.region_coverage
     for region in plan.document.regions:
         below = findings.at(f"regions.{region.id}")
@@ -160,7 +160,7 @@ def _by_cause(cause: Ints) -> Iterator[tuple[str, Mask]]:
         yield name, np.isin(cause, [k for k, c in enumerate(_CAUSES) if c == name])
 
 
-def _parts(case: AuditCase) -> _Parts:
+def region_parts(case: AuditCase) -> _Parts:
     """The audit's samples, and more of large regions in which they are too few."""
     parts = [(case.actual, case.reachable)]
     surface, region = case.plan.surface, case.samples.region

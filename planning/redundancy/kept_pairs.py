@@ -1,0 +1,44 @@
+"""Whether rings that were spaced anew leave what pairs must measure after a loss."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.proofs.losses import PairDemand
+from planning.proofs.quotas import RegionFloors
+from planning.scene.draws import DRAWS
+from planning.scene.measured import lit_samples
+from planning.scene.measuring_pairs import measuring_pairs
+from planning.scene.scene import Scene
+
+# Of what pairs must measure after a loss, kept to spare for fresh samples.
+_MORE = 1.01
+
+
+def rings_uphold(
+    scene: Scene,
+    before: Sequence[PlannedProjector],
+    after: Sequence[PlannedProjector],
+    cameras: Sequence[PlannedCamera],
+) -> bool:
+    """Return whether other rings of the same projectors leave each loss its share.
+
+    A finer gap measures nothing more, but pairs to spare may be lost by it.
+    """
+    asked = scene.requirements.redundancy
+    if asked is None:
+        return True
+    target = scene.target_samples(DRAWS.redundant_rings)
+    samples = lit_samples(scene, before, target)
+    renewed = samples
+    for p, projector in enumerate(after):
+        renewed = renewed.with_code(p, projector)
+    lit = samples.lit
+    left = [np.any(np.delete(lit, p, axis=1), axis=1) for p in range(lit.shape[1])]
+    reached = np.stack([lit.any(axis=1), *(left if asked.survive else [])], axis=1)
+    regions = RegionFloors.of(scene, samples.target)
+    share = scene.requirements.coverage
+    demand = PairDemand.of(asked, regions, reached, _MORE * share, spare=1.0)
+    kept = demand.kept(measuring_pairs(scene, cameras, samples))
+    return demand.upheld(kept, measuring_pairs(scene, cameras, renewed))

@@ -1,0 +1,149 @@
+"""The fewest projectors of which any one may be lost."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.model.planned import PlannedProjector
+from planning.projectors.candidate_set import CandidateSet, CandidateSource
+from planning.projectors.loss_confirmation import confirms_losses
+from planning.projectors.projector_stage import ProjectorStage
+from planning.proofs.candidate_certificate import counted
+from planning.scene.draws import DRAWS
+from planning.scene.scene import Scene
+from solvers.redundant.fewest_redundant import RedundantSolution, solve_redundant
+from solvers.redundant.redundant_cover import RedundantCover
+
+from .redundant_counts import RedundantCount, larger_selections
+
+_Index = NDArray[np.int64]
+
+_ROUNDS = 4
+# Projectors beyond the bound that are tried.
+_MORE = 8
+# How far out poses between the chosen ones are offered, in spacings of the lattice.
+_SCALES = (1.0, 0.5, 0.25)
+# Of fresh samples that don't confirm it one in so many joins those of the next.
+_JOINING = 3
+
+
+def redundant_projectors(
+    scene: Scene, stage: ProjectorStage, templates: tuple[PlannedProjector, ...]
+) -> tuple[ProjectorStage, RedundantCount]:
+    """Return the stage with as many projectors as stand the loss of any one.
+
+    Without any one of them it is a cover still, so that the stage's own bounds, plus
+    one, bound their number. Where it takes more than that, poses around those chosen
+    are offered. Fresh samples confirm the end.
+    """
+    search = _Search(CandidateSource(scene, templates), len(stage.reference))
+    candidates = replace(stage.candidates, scene=scene)
+    bound, allowed = _bound(stage), scene.requirements.max_projectors
+    start = _places(candidates, stage.projectors)
+    for attempt in range(1, _ROUNDS + 1):
+        candidates, enough = search.fewest(candidates, start, bound)
+        found = enough
+        if len(enough.selected) > allowed:
+            found = _solved(candidates, enough.selected, allowed, allowed)
+        start = found.selected
+        fresh = scene.target_samples(DRAWS.redundant_projectors.later(attempt))
+        met = found.status != "infeasible"
+        if not met or attempt == _ROUNDS or confirms_losses(
+            candidates, candidates.of(start), fresh
+        ):
+            break
+        some = fresh.take(np.arange(0, len(fresh), _JOINING))
+        candidates = candidates.with_samples(candidates.on(some))
+    devices = candidates.of(found.selected)
+    more = larger_selections(_cover(candidates), found.selected, allowed)
+    count = RedundantCount(
+        needed=max(len(enough.selected), len(devices)),
+        without=stage.certificate.needed.count,
+        lower_bound=min(bound, len(enough.selected)),
+        everywhere=_everywhere(stage, devices),
+        more={n: candidates.of(chosen) for n, chosen in more.items()},
+        met=met,
+    )
+    redundant = replace(stage, candidates=candidates, projectors=devices)
+    samples = candidates.samples
+    reached = float(candidates.reached.sum()) * samples.samples.weight
+    return counted(redundant, devices, reached), count
+
+
+def _bound(stage: ProjectorStage) -> int:
+    """One more than any cover of the candidates, unless existing ones suffice."""
+    return stage.certificate.needed.lower_bound + 1
+
+
+def _everywhere(
+    stage: ProjectorStage, devices: tuple[PlannedProjector, ...]
+) -> int | None:
+    """The same over all poses."""
+    bound = stage.certificate.continuous
+    if bound is None or all(device.existing for device in devices):
+        return None if bound is None else len(devices)
+    return bound.lower_bound + 1
+
+
+def _places(
+    candidates: CandidateSet, projectors: tuple[PlannedProjector, ...]
+) -> _Index:
+    place = {id(one): k for k, one in enumerate(candidates.projectors)}
+    known = [place[id(one)] for one in projectors if id(one) in place]
+    return np.array(sorted(known), dtype=np.int64)
+
+
+def _cover(candidates: CandidateSet) -> RedundantCover:
+    """State the cover of which any one set may be lost."""
+    # Floors so high that fresh samples should confirm them.
+    quotas, stock = candidates.cover.aims, candidates.stock
+    return RedundantCover.of(
+        [candidates.lit.astype(np.uint8)],
+        [quotas.total],
+        row_sets=quotas.regions.row,
+        floors=quotas.floors[None],
+        n_fixed=candidates.n_existing,
+        kinds=None if stock is None else stock.kinds,
+        stock=None if stock is None else stock.counts,
+    )
+
+
+def _solved(
+    candidates: CandidateSet, start: _Index, least: int, most: int
+) -> RedundantSolution:
+    return solve_redundant(
+        _cover(candidates),
+        lower_bound=least,
+        most=most,
+        start=start,
+        seed=candidates.scene.seed,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """Looks among candidates, and for poses between them where that saves one."""
+
+    source: CandidateSource
+    n_lattice: int
+
+    def fewest(
+        self, candidates: CandidateSet, start: _Index, bound: int
+    ) -> tuple[CandidateSet, RedundantSolution]:
+        """Return the fewest found, and the candidates that they are of."""
+        found = _solved(candidates, start, bound, bound + _MORE)
+        for scale in _SCALES:
+            count = len(found.selected)
+            if found.status == "infeasible" or count <= bound:
+                break
+            fewer = _solved(candidates, found.selected, count - 1, count - 1)
+            near = candidates.of(np.union1d(found.selected, fewer.selected))
+            more = self.source.around(near, self.n_lattice, scale, far=True)
+            if not more:
+                continue
+            offered = candidates.extended(more)
+            again = _solved(offered, fewer.selected, bound, count - 1)
+            if again.status != "infeasible":
+                candidates, found = offered, again
+        return candidates, found
