@@ -37,7 +37,7 @@ _MORE = 16
 # Standard errors above floors at which selections aim, and at which fresh ones agree.
 _AIMED = 1.0
 # Counted work of each bound.
-_BUDGET = 5e8
+_BUDGET = 1e8
 
 
 def redundant_cameras(

@@ -12,7 +12,11 @@ from planning.projectors.projector_stage import ProjectorStage
 from planning.proofs.candidate_certificate import counted
 from planning.scene.draws import DRAWS
 from planning.scene.scene import Scene
-from solvers.redundant.fewest_redundant import RedundantSolution, solve_redundant
+from solvers.redundant.fewest_redundant import (
+    KICKS,
+    RedundantSolution,
+    solve_redundant,
+)
 from solvers.redundant.redundant_cover import RedundantCover
 
 from .redundant_counts import RedundantCount, larger_selections
@@ -22,6 +26,8 @@ _Index = NDArray[np.int64]
 _ROUNDS = 4
 # Projectors beyond the bound that are tried.
 _MORE = 8
+# Times that sets are thrown out where poses between are offered.
+_KICKS = 6
 # How far out poses between the chosen ones are offered, in spacings of the lattice.
 _SCALES = (1.0, 0.5, 0.25)
 # Of fresh samples that don't confirm it one in so many joins those of the next.
@@ -110,13 +116,19 @@ def _cover(candidates: CandidateSet) -> RedundantCover:
 
 
 def _solved(
-    candidates: CandidateSet, start: _Index, least: int, most: int
+    candidates: CandidateSet,
+    start: _Index,
+    least: int,
+    most: int,
+    *,
+    kicks: int = KICKS,
 ) -> RedundantSolution:
     return solve_redundant(
         _cover(candidates),
         lower_bound=least,
         most=most,
         start=start,
+        kicks=kicks,
         seed=candidates.scene.seed,
     )
 
@@ -133,17 +145,26 @@ class _Search:
     ) -> tuple[CandidateSet, RedundantSolution]:
         """Return the fewest found, and the candidates that they are of."""
         found = _solved(candidates, start, bound, bound + _MORE)
-        for scale in _SCALES:
-            count = len(found.selected)
-            if found.status == "infeasible" or count <= bound:
+        while found.status != "infeasible" and len(found.selected) > bound:
+            better = self._one_fewer(candidates, found.selected)
+            if better is None:
                 break
-            fewer = _solved(candidates, found.selected, count - 1, count - 1)
-            near = candidates.of(np.union1d(found.selected, fewer.selected))
+            candidates, found = better
+        return candidates, found
+
+    def _one_fewer(
+        self, candidates: CandidateSet, chosen: _Index
+    ) -> tuple[CandidateSet, RedundantSolution] | None:
+        """Return one fewer from poses around those that lack least, if any do."""
+        count, poses, best = len(chosen) - 1, candidates, chosen
+        for scale in _SCALES:
+            near = poses.of(best)
             more = self.source.around(near, self.n_lattice, scale, far=True)
             if not more:
                 continue
-            offered = candidates.extended(more)
-            again = _solved(offered, fewer.selected, bound, count - 1)
-            if again.status != "infeasible":
-                candidates, found = offered, again
-        return candidates, found
+            poses = poses.extended(more)
+            found = _solved(poses, best, count, count, kicks=_KICKS)
+            if found.status != "infeasible":
+                return poses, found
+            best = found.selected
+        return None

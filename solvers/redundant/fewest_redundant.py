@@ -22,6 +22,9 @@ from .redundant_cover import RedundantCover
 _Index = NDArray[np.int64]
 # Times that sets are thrown out of the best selection, for each number of them.
 KICKS = 24
+# Where more than this share of what all losses must leave is lacking after so many, it
+# isn't worth more.
+_HOPEFUL, _LEAST = 0.03, 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,11 +101,11 @@ def least_redundant(
     fixed = cover.fixed
     if fixed.size and cover.lacking(fixed) == 0:
         return int(fixed.size)
-    bounds = [int(fixed.size)]
-    for case, serves in enumerate(cover.serves):
-        found = _plain_bound(cover, case, serves, seed, budget)
-        bounds.append(found + (case == 0 and cover.losable))
-    return max(bounds)
+    bounds = [
+        _plain_bound(cover, case, serves, seed, budget) + (case == 0 and cover.losable)
+        for case, serves in enumerate(cover.serves)
+    ]
+    return max([int(fixed.size), *bounds])
 
 
 def _plain_bound(
@@ -139,8 +142,10 @@ def _search(
     """Return the best selection of so many sets that was met, and its rank."""
     best = _improved(exchanges, _completed(exchanges, start, count))
     movable = max(count - exchanges.cover.fixed.size, 1)
+    hopeful = _HOPEFUL * _asked(exchanges.cover, count)
     for kick in range(kicks):
-        if best[0][0] == 0 and kick >= kicks // 3:
+        met = best[0][0] == 0
+        if met and kick >= kicks // 3 or best[0][0] > hopeful and kick >= _LEAST:
             break
         n_out = min(1 + kick % 3, movable)
         free = np.setdiff1d(best[1], exchanges.cover.fixed)
@@ -154,6 +159,12 @@ def _search(
         found = _improved(exchanges, _completed(exchanges, left, count))
         best = min(best, found, key=lambda one: one[0])
     return best
+
+
+def _asked(cover: RedundantCover, count: int) -> int:
+    """What all losses of so many sets must leave together."""
+    times = count if cover.losable else 1
+    return int(cover.required[0]) * times + int(cover.required[1:].sum())
 
 
 def _completed(exchanges: Exchanges, start: _Index, count: int) -> _Index:
