@@ -206,7 +206,9 @@ def _keeping_pairs(
         return []
     scene, lit, share = samples.scene, samples.lit, samples.scene.requirements.coverage
     regions = RegionFloors.of(scene, lit.target)
-    left = [np.any(np.delete(lit.lit, p, axis=1), axis=1) for p in range(lit.lit.shape[1])]
+    left = [
+        np.any(np.delete(lit.lit, p, axis=1), axis=1) for p in range(lit.lit.shape[1])
+    ]
     reached = np.stack([lit.lit.any(axis=1), *(left if asked.survive else [])], axis=1)
     demand = PairDemand.of(asked, regions, reached, share * _MORE, spare=1.0)
     kept = demand.kept(measuring_pairs(scene, cameras, lit))

@@ -73,7 +73,9 @@ class PairDemand:
         spare: float = 0.0,
     ) -> "PairDemand":
         """Return a share of what is reached in each case, (n, 1 + n_projectors)."""
-        quotas = (Quotas.of(regions, column, share, spare=spare) for column in reached.T)
+        quotas = (
+            Quotas.of(regions, column, share, spare=spare) for column in reached.T
+        )
         return cls(asked, tuple(quotas))
 
     def losses(self, pairs: _Mask) -> Iterator[tuple[int, _Mask]]:

@@ -60,33 +60,50 @@ def redundant_cameras(
     start = np.array(sorted(place[id(one)] for one in stage.cameras), dtype=np.int64)
     plain = stage.certificate.needed.lower_bound + asked.survive
     bound = max(plain, least_redundant(pairs.cover(), budget=_BUDGET))
-    for attempt in range(1, _ROUNDS + 1):
-        cover = pairs.cover()
-        enough = found = _solved(scene, cover, start, bound, bound + _MORE)
-        if allowed is not None and len(enough.selected) > allowed:
-            found = _solved(scene, cover, enough.selected, allowed, allowed)
-        start, met = found.selected, found.status != "infeasible"
-        if not met or attempt == _ROUNDS:
-            break
-        draw = DRAWS.redundant_cameras.later(attempt)
-        fresh = _PairsOfAll.on(scene, projectors, stage, scene.target_samples(draw))
-        if fresh.demand(0.0).met(fresh.pairs[:, start]):
-            break
-        pairs = pairs.with_samples(fresh)
+    pairs, enough, found = _confirmed(scene, projectors, stage, pairs, start, bound)
     cameras = tuple(offered.cameras[c] for c in found.selected)
-    more = larger_selections(cover, found.selected, allowed)
+    more = larger_selections(pairs.cover(), found.selected, allowed)
     count = RedundantCount(
         needed=max(len(enough.selected), len(cameras)),
         without=without,
         lower_bound=min(bound, len(enough.selected)),
         everywhere=_everywhere(stage, cameras, asked),
         more={n: tuple(offered.cameras[c] for c in some) for n, some in more.items()},
-        met=met,
+        met=found.status != "infeasible",
     )
     weight = stage.cover.samples.target.samples.weight
     reached = float(stage.cover.measured.any(axis=1).sum()) * weight
     taken = _with_cameras(stage, cameras, found.selected)
     return counted(taken, cameras, reached), count
+
+
+def _confirmed(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    stage: CameraStage,
+    pairs: "_PairsOfAll",
+    start: _Index,
+    bound: int,
+) -> tuple["_PairsOfAll", RedundantSolution, RedundantSolution]:
+    """Return what is enough, and what is allowed of it, when fresh samples agree.
+
+    Where they don't they join the samples, a few times.
+    """
+    allowed, attempt = scene.requirements.max_cameras, 0
+    while True:
+        attempt += 1
+        cover = pairs.cover()
+        enough = found = _solved(scene, cover, start, bound, bound + _MORE)
+        start = enough.selected
+        if allowed is not None and len(start) > allowed:
+            found = _solved(scene, cover, start, allowed, allowed)
+        if found.status == "infeasible" or attempt == _ROUNDS:
+            return pairs, enough, found
+        draw = DRAWS.redundant_cameras.later(attempt)
+        fresh = _PairsOfAll.on(scene, projectors, stage, scene.target_samples(draw))
+        if fresh.demand(0.0).met(fresh.pairs[:, start]):
+            return pairs, enough, found
+        pairs = pairs.with_samples(fresh)
 
 
 def _solved(

@@ -46,21 +46,9 @@ def redundant_projectors(
     search = _Search(CandidateSource(scene, templates), len(stage.reference))
     candidates = replace(stage.candidates, scene=scene)
     bound, allowed = _bound(stage), scene.requirements.max_projectors
-    start = _places(candidates, stage.projectors)
-    for attempt in range(1, _ROUNDS + 1):
-        candidates, enough = search.fewest(candidates, start, bound)
-        found = enough
-        if len(enough.selected) > allowed:
-            found = _solved(candidates, enough.selected, allowed, allowed)
-        start = found.selected
-        fresh = scene.target_samples(DRAWS.redundant_projectors.later(attempt))
-        met = found.status != "infeasible"
-        if not met or attempt == _ROUNDS or confirms_losses(
-            candidates, candidates.of(start), fresh
-        ):
-            break
-        some = fresh.take(np.arange(0, len(fresh), _JOINING))
-        candidates = candidates.with_samples(candidates.on(some))
+    candidates, enough, found = _confirmed(
+        search, candidates, _places(candidates, stage.projectors), bound
+    )
     devices = candidates.of(found.selected)
     more = larger_selections(_cover(candidates), found.selected, allowed)
     count = RedundantCount(
@@ -69,12 +57,36 @@ def redundant_projectors(
         lower_bound=min(bound, len(enough.selected)),
         everywhere=_everywhere(stage, devices),
         more={n: candidates.of(chosen) for n, chosen in more.items()},
-        met=met,
+        met=found.status != "infeasible",
     )
     redundant = replace(stage, candidates=candidates, projectors=devices)
     samples = candidates.samples
     reached = float(candidates.reached.sum()) * samples.samples.weight
     return counted(redundant, devices, reached), count
+
+
+def _confirmed(
+    search: "_Search", candidates: CandidateSet, start: _Index, bound: int
+) -> tuple[CandidateSet, RedundantSolution, RedundantSolution]:
+    """Return what is enough, and what is allowed of it, when fresh samples agree.
+
+    Where they don't some of them join the samples, a few times.
+    """
+    scene, attempt = candidates.scene, 0
+    allowed = scene.requirements.max_projectors
+    while True:
+        attempt += 1
+        candidates, enough = search.fewest(candidates, start, bound)
+        found, start = enough, enough.selected
+        if len(start) > allowed:
+            found = _solved(candidates, start, allowed, allowed)
+        if found.status == "infeasible" or attempt == _ROUNDS:
+            return candidates, enough, found
+        fresh = scene.target_samples(DRAWS.redundant_projectors.later(attempt))
+        if confirms_losses(candidates, candidates.of(start), fresh):
+            return candidates, enough, found
+        some = fresh.take(np.arange(0, len(fresh), _JOINING))
+        candidates = candidates.with_samples(candidates.on(some))
 
 
 def _bound(stage: ProjectorStage) -> int:

@@ -144,9 +144,7 @@ def _floors_missed(left: _Left, scene: Scene, claims: Claims) -> Iterator[int]:
                 break
 
 
-def falls_short_after(
-    loss: LossRecord, required: Requirements
-) -> tuple[bool, bool]:
+def falls_short_after(loss: LossRecord, required: Requirements) -> tuple[bool, bool]:
     """Return whether too little is lit, and too little measured, after a loss.
 
     Regions below their floor count as too little measured.

@@ -145,7 +145,7 @@ def _search(
     hopeful = _HOPEFUL * _asked(exchanges.cover, count)
     for kick in range(kicks):
         met = best[0][0] == 0
-        if met and kick >= kicks // 3 or best[0][0] > hopeful and kick >= _LEAST:
+        if kick >= (kicks // 3 if met else _LEAST) and (met or best[0][0] > hopeful):
             break
         n_out = min(1 + kick % 3, movable)
         free = np.setdiff1d(best[1], exchanges.cover.fixed)

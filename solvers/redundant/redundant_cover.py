@@ -1,10 +1,10 @@
-"""A cover that asks to be met several times over, in several cases, and after a loss.
+r"""A cover that asks to be met several times over, in several cases, and after a loss.
 
 A set s serves element e a_gse times in case g; a selection S covers e in case g if its
 sets serve it K times together. Elements weigh the same::
 
     minimise    |S|
-    subject to  |covered_0(S \\ {s})| >= W_0   for each s in S, where one may be lost
+    subject to  |covered_0(S \ {s})| >= W_0   for each s in S, where one may be lost
                 |covered_0(S)| >= W_0         where none may
                 |covered_g(S)| >= W_g         for each further case g
                 F selected,   at most b_k sets of each kind k

@@ -11,7 +11,7 @@ from solvers.redundant.redundant_cover import RedundantCover
 
 
 def random_cover(seed):
-    """Pairs of sets and a second kind, whose loss is a case each; floors; fixed sets."""
+    """Pairs with sets of a second kind, whose losses are cases; floors; fixed sets."""
     rng = np.random.default_rng(seed)
     n, m, others = 24, 8, int(rng.integers(1, 4))
     need, losable = int(rng.integers(1, 4)), bool(rng.integers(2))
@@ -74,13 +74,17 @@ def fewest(cover):
 def test_as_few_as_all_selections_allow(seed):
     cover = random_cover(seed)
     truth = fewest(cover)
-    found = solve_redundant(cover, lower_bound=least_redundant(cover, budget=1e5), kicks=6)
+    found = solve_redundant(
+        cover, lower_bound=least_redundant(cover, budget=1e5), kicks=6
+    )
     if truth is None:
         assert found.status == "infeasible"
         return
-    assert found.status != "infeasible" and is_met(cover, found.selected)
+    assert found.status != "infeasible"
+    assert is_met(cover, found.selected)
     assert len(found.selected) == truth >= found.lower_bound
-    assert cover.in_stock(found.selected) and np.isin(cover.fixed, found.selected).all()
+    assert cover.in_stock(found.selected)
+    assert np.isin(cover.fixed, found.selected).all()
 
 
 def test_every_exchange_is_ranked_as_what_it_leaves():
@@ -122,16 +126,23 @@ def test_pairs_count_as_often_as_they_serve():
     serves = np.array([[2, 1, 1, 0], [2, 1, 1, 1], [2, 0, 1, 1]], dtype=np.uint8)
     cover = RedundantCover.of([serves], [3], need=2, losable=False)
     found = solve_redundant(cover, lower_bound=least_redundant(cover, budget=1e5))
-    assert found.selected.tolist() == [0] and found.status == "optimal"
+    assert (found.selected.tolist(), found.status) == ([0], "optimal")
     more = RedundantCover.of([serves], [3], need=3, losable=False)
-    assert len(solve_redundant(more, lower_bound=least_redundant(more, budget=1e5)).selected) == 2
+    assert (
+        len(
+            solve_redundant(
+                more, lower_bound=least_redundant(more, budget=1e5)
+            ).selected
+        )
+        == 2
+    )
 
 
 def test_what_is_allowed_lacks_least():
     half = np.zeros((10, 4), dtype=np.uint8)
     half[:5, :2] = half[5:, 2:] = 1
     found = solve_redundant(RedundantCover.of([half], [10]), most=3)
-    assert found.status == "infeasible" and len(found.selected) == 3
+    assert (found.status, len(found.selected)) == ("infeasible", 3)
     with pytest.raises(ValueError, match="need must be 1 or more"):
         RedundantCover.of([half], [10], need=0)
     with pytest.raises(ValueError, match="required must be"):

@@ -155,11 +155,12 @@ def _unmet_requirements(plan: RigPlan) -> tuple[str, ...]:
         for name, (part, area), share, (of, total) in rules
         if not (total > 0.0 and area >= share * total * (1.0 - 1e-9))
     )
-    return unmet + tuple(
+    floors = tuple(
         f"requirements.region_coverage: regions.{region.id} is lit "
         f"{areas.lit_m2:.6g} m² of {areas.reachable_by_projectors_m2:.6g} m² and "
         f"measured {areas.measured_m2:.6g} m² of {areas.reachable_by_cameras_m2:.6g} "
         f"m², less than {limits.region_coverage:g} of either"
         for region in plan.document.regions
         if (areas := region.coverage) is not None and areas.floor == "missed"
-    ) + tuple(unmet_after_losses(plan))
+    )
+    return (*unmet, *floors, *unmet_after_losses(plan))

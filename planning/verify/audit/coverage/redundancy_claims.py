@@ -58,8 +58,9 @@ def audit_redundancy(case: AuditCase, findings: AuditFindings) -> None:
         )
         return
     names = _names(case.plan, asked)
-    if not below.same(
-        "losses", [loss.lost for loss in record.losses], names, "the devices' order"
+    told = [loss.lost for loss in record.losses]
+    if not below.holds(
+        told == names, "losses", f"{told} must be {names}, each device after none"
     ):
         return
     rests = _rests(case, case.actual, asked)
@@ -106,7 +107,7 @@ def _names(plan: RigPlan, asked: Redundancy) -> list[str | None]:
 
 
 def _rests(case: AuditCase, actual: Recomputed, asked: Redundancy) -> Iterator[_Rest]:
-    """Yield what is left with all there, without each projector, without each camera."""
+    """Yield what is left with all there, then without each of the devices."""
     pairs, lit_by = actual.pairs == MEASURED, actual.lit_by
     reached = _reached(case.plan, actual, case.shadow, asked, case.seed)
     n_projectors, n_cameras = pairs.shape[:2]
@@ -119,7 +120,8 @@ def _rests(case: AuditCase, actual: Recomputed, asked: Redundancy) -> Iterator[_
         return
     for p in range(n_projectors):
         others = np.arange(n_projectors) != p
-        yield _Rest(lit_by[others].any(axis=0), fold(pairs[others]), reached[1 + p])
+        lit = np.any(lit_by[others], axis=0)
+        yield _Rest(lit, fold(pairs[others]), reached[1 + p])
     for c in range(n_cameras):
         others = np.arange(n_cameras) != c
         yield _Rest(actual.lit, fold(pairs[:, others]), reached[0])
