@@ -29,11 +29,6 @@ from planning.scene.ranges.ranged_body import RangedBody
 from planning.verify.verification import Verification, verify_plan
 
 from .steps.prepare import prepared, request_of, standing_devices
-from .steps.redundant import (
-    check_redundancy,
-    one_more_for_losses,
-    placed_redundantly,
-)
 from .steps.stages import (
     as_they_stand,
     bounded_cameras,
@@ -43,6 +38,11 @@ from .steps.stages import (
     placed,
     polished,
     with_free_axes,
+)
+from .steps.surviving import (
+    check_survival,
+    one_more_for_losses,
+    placed_to_survive,
 )
 
 Keep = Callable[[RigPlan], None]
@@ -180,7 +180,7 @@ def plan_rig(
             mounted=fixed,
             evaluates=evaluates,
         )
-        check_redundancy(request)
+        check_survival(request)
         planned = _evaluated if evaluates else robustly(_planned)
         plan, partial = planned(request, clock, keep)
         if check and not plan.document.truncated:
@@ -279,8 +279,8 @@ def _first_plan(request: PlanRequest, clock: Stopwatch) -> PartialPlan:
     check_fields(request.rig.fits(request.mesh))
     ready = prepared(request, clock)
     stage = bounded_projectors(ready, first_projectors(ready, clock), clock)
-    if ready.scene.requirements.redundancy is not None:
-        return placed_redundantly(ready, stage, clock)
+    if ready.scene.requirements.survival is not None:
+        return placed_to_survive(ready, stage, clock)
     return placed(ready, stage, clock)
 
 

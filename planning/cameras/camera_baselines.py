@@ -201,7 +201,7 @@ def _keeping_pairs(
 
     What counts is a share of what is lit in each case, as far as it is measured now.
     """
-    asked = samples.scene.requirements.redundancy
+    asked = samples.scene.requirements.survival
     if asked is None:
         return []
     scene, lit, share = samples.scene, samples.lit, samples.scene.requirements.coverage

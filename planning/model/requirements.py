@@ -13,7 +13,7 @@ from .bodies import Box, Existing, Mount, Triple
 from .calibration_errors import PERFECT, CalibrationErrors, Robust
 from .light.drawn_edges import DrawnEdges
 from .light.light_budget import LightBudget
-from .redundancy import Redundancy
+from .survival import Survival
 
 # Of a workspace: zones and standoffs that aren't given have no key.
 _ZONES = ("box", "keep_out", "mounting")
@@ -266,7 +266,7 @@ class Requirements:
         region_share: Regions of at least this share of the target's area have it.
         robust: What drawn rigs must meet, where the rest is tightened for it.
         stock: Models of which there are so many and no more.
-        redundancy: Pairs that must measure what counts, and losses to survive; None:
+        survival: Pairs that must measure what counts, and losses to survive; None:
             one pair, no loss.
     """
 
@@ -287,7 +287,7 @@ class Requirements:
     region_share: float = 0.01
     robust: Robust | None = None
     stock: tuple[Stock, ...] = ()
-    redundancy: Redundancy | None = None
+    survival: Survival | None = None
 
     def stock_of(self, kind: str) -> dict[str, int]:
         """Return how many there are of each counted model of a kind."""
@@ -304,7 +304,7 @@ class Requirements:
         devices = [(device, _OF_ITS_OWN) for device in document["existing"]]
         tables = [
             (document["workspace"], _LEFT_OUT),
-            (document, ("existing", "robust", "stock", "redundancy")),
+            (document, ("existing", "robust", "stock", "survival")),
             (document["triangulation"], ("light",)),
         ]
         for table, names in devices + tables:

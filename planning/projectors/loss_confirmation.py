@@ -23,7 +23,7 @@ def confirms_losses(
     these and more samples of them.
     """
     scene, samples, n = candidates.scene, fresh, len(fresh)
-    more = scene.more_of_regions(samples, DRAWS.redundant_regions)
+    more = scene.more_of_regions(samples, DRAWS.surviving_regions)
     if scene.requirements.region_coverage and more is not None:
         samples = merged(samples, more)
     taken = CandidateSet.over(scene, samples, tuple(projectors))

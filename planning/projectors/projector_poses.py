@@ -61,9 +61,9 @@ def widen_margins(scene: Scene, stage: ProjectorStage) -> tuple[PlannedProjector
     deny it and not the beginning, nothing is moved.
     """
     samples, reached = stage.candidates.samples, stage.candidates.reached
-    redundancy = scene.requirements.redundancy
+    survival = scene.requirements.survival
     state = _Lit(scene, samples, list(stage.projectors), reached)
-    if survives := bool(redundancy and redundancy.survive):
+    if survives := bool(survival and survival.survive):
         aims = stage.candidates.cover.aims
         state.kept_after_loss = light_kept(_spared(aims), np.isfinite(state.margin))
     # With too few devices, what they light is what counts.
@@ -87,7 +87,7 @@ def widen_margins(scene: Scene, stage: ProjectorStage) -> tuple[PlannedProjector
     held = confirms(stage.candidates, wider, _CONFIRMING)
     lost = not held and confirms(stage.candidates, chosen, _CONFIRMING)
     if survives and not lost:
-        fresh = scene.target_samples(DRAWS.redundant_projectors.later(_CONFIRMING))
+        fresh = scene.target_samples(DRAWS.surviving_projectors.later(_CONFIRMING))
         lost = not confirms_losses(stage.candidates, wider, fresh)
     return chosen if lost else wider
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.redundancy import Redundancy
+from planning.model.survival import Survival
 from planning.scene.measuring_pairs import (
     measured_fold,
     without_camera,
@@ -59,13 +59,13 @@ class PairDemand:
         quotas: With all projectors; then without each, if one may be lost.
     """
 
-    asked: Redundancy
+    asked: Survival
     quotas: tuple[Quotas, ...]
 
     @classmethod
     def of(
         cls,
-        asked: Redundancy,
+        asked: Survival,
         regions: RegionFloors,
         reached: _Mask,
         share: float,

@@ -46,7 +46,7 @@ from .entries import device_entries as entries
 from .judged import Devices
 from .marginal import marginal_records
 from .partial_plan import PartialPlan, Prepared
-from .redundancy_claims import redundancy_record
+from .survival_claims import survival_record
 
 
 def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
@@ -59,7 +59,7 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
     with clock.stage("claims", "coverage, recomputed from the rounded poses"):
         claims = make_claims(scene, devices)
         marginal = marginal_records(partial, devices, claims)
-        redundancy = redundancy_record(scene, devices, claims, partial.redundant)
+        survival = survival_record(scene, devices, claims, partial.surviving)
     among = scene.among((*devices.projectors, *devices.cameras))
     coverage, certificates = claims.coverage, _certificates(partial)
     regions = entries.region_records(scene.mesh, partial.ready.regions, claims)
@@ -121,8 +121,8 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
         reconstruction=None,
         timings_s=dict(clock.seconds),
     )
-    if redundancy is not None:
-        document = document.changed(redundancy=redundancy)
+    if survival is not None:
+        document = document.changed(survival=survival)
     if partial.request.ranges is not None:
         document = document.changed(ranges=ranges_record(*partial.request.ranges))
     mounted = partial.request.mounted

@@ -10,7 +10,6 @@ from planning.model.document.certificates import CamerasBy
 from planning.model.document.device_records import AxisTaken, RingAxis
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.projectors.projector_stage import ProjectorStage
-from planning.redundancy.redundant_counts import RedundantCount
 from planning.rig.mounted import Mounted
 from planning.rig.range_guard import Guard
 from planning.rig.rig import Rig
@@ -20,6 +19,7 @@ from planning.scene.interest import Interest
 from planning.scene.lights import light_of
 from planning.scene.ranges.ranged_body import RangedBody
 from planning.scene.scene import Scene
+from planning.survival.surviving_counts import SurvivingCount
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,8 +87,8 @@ class PartialPlan:
     """All stages as far as they came; enough to write a plan from.
 
     `projectors` have evenly spaced rings about `axes`; `rings` holds those that cameras
-    let finer. `other_axes` are the projectors with other axes, to compare. `redundant`
-    says what redundancy takes of projectors and cameras; None: it isn't asked for.
+    let finer. `other_axes` are the projectors with other axes, to compare. `surviving`
+    says what survival takes of projectors and cameras; None: it isn't asked for.
     """
 
     ready: Prepared
@@ -100,7 +100,7 @@ class PartialPlan:
     truncated: bool = False
     rings: RingStage | None = None
     other_axes: tuple[PlannedProjector, ...] = ()
-    redundant: tuple[RedundantCount, RedundantCount] | None = None
+    surviving: tuple[SurvivingCount, SurvivingCount] | None = None
 
     @property
     def request(self) -> PlanRequest:

@@ -12,7 +12,6 @@ from planning.model.calibration_errors import AS_PLANNED
 from planning.model.errors import InfeasibleLimitsError, InputError
 from planning.model.light.drawn_edges import DrawnEdges
 from planning.model.light.light_budget import LightBudget
-from planning.model.redundancy import Redundancy
 from planning.model.requirements import (
     CameraLimits,
     CheckLimits,
@@ -21,6 +20,7 @@ from planning.model.requirements import (
     TriangulationLimits,
     Workspace,
 )
+from planning.model.survival import Survival
 from planning.scene.workspace.zone_conflicts import check_zones
 
 from .rig_tables import LimitsTable, RequirementsTable, RigTable
@@ -29,7 +29,7 @@ from .wishes import Wishes
 _Limits = TypeVar("_Limits", ProjectorLimits, CameraLimits, TriangulationLimits)
 
 _WARN_INCIDENCE_DEG = 70.0
-# Pairs that may be asked for of each point: more are no redundancy but another rig.
+# Pairs that may be asked for of each point: more are no survival but another rig.
 MOST_VIEWS = 8
 
 _UP_VECTORS = {
@@ -94,7 +94,7 @@ def build_requirements(
         workspace=workspace,
         region_coverage=_share("region_coverage", wishes, shares, or_none=True),
         region_share=shares.region_share,
-        redundancy=_redundancy(wishes),
+        survival=_survival(wishes),
     )
 
 
@@ -115,7 +115,7 @@ def limit_notes(limits: LimitsTable) -> tuple[str, ...]:
     return tuple(sentences)
 
 
-def _redundancy(wishes: Wishes) -> Redundancy | None:
+def _survival(wishes: Wishes) -> Survival | None:
     """Return what is asked beyond one pair; None: nothing.
 
     Raises:
@@ -126,7 +126,7 @@ def _redundancy(wishes: Wishes) -> Redundancy | None:
         raise InputError(f"views = {views} must be from 1 to {MOST_VIEWS}")
     if survive not in (0, 1):
         raise InputError(f"survive = {survive} must be 0 or 1")
-    asked = Redundancy(views, survive)
+    asked = Survival(views, survive)
     if not asked.asks:
         return None
     if wishes.robust is not None:

@@ -27,7 +27,6 @@ from planning.projectors.projector_stage import ProjectorStage, plan_projectors
 from planning.projectors.proved_projectors import prove_fewest
 from planning.proofs import camera_bound, projector_bound
 from planning.proofs.candidate_certificate import larger, unproved, unsought
-from planning.redundancy.kept_pairs import rings_uphold
 from planning.report.advice.camera_relaxations import nothing_measured
 from planning.report.advice.projector_relaxations import nothing_lit
 from planning.report.advice.standing_inside import standing_inside
@@ -37,6 +36,7 @@ from planning.report.region_claims import below_floor
 from planning.rings.acquisition import pixels_read
 from planning.rings.ring_stage import RingStage, Spacing, space_rings
 from planning.scene.draws import DRAWS
+from planning.survival.kept_pairs import rings_uphold
 
 from .prepare import offered
 
@@ -176,7 +176,7 @@ def _with_rings(
     """Cameras as they moved, the ring axes that follow them, and rings for both."""
     scene, request = partial.scene, partial.request
     final = CameraSolution(partial.projectors, stage, partial.axes)
-    if partial.axes == "free" and partial.redundant is None:
+    if partial.axes == "free" and partial.surviving is None:
         final = follow_cameras(
             scene, partial.projectors, moved.cameras, stage, request.cameras_by
         )
@@ -228,7 +228,7 @@ def with_free_axes(
     None where that was asked for, or enough is measured.
     """
     left = partial.axes == "centred" and partial.request.ring_axis == "auto"
-    left = left and partial.redundant is None
+    left = left and partial.surviving is None
     if not left or _short_of(plan) != (False, True):
         return None
     clock.say("  centred ring axes fall short: free ones")
@@ -264,7 +264,7 @@ def one_device_more(
     """
     required = plan.requirements
     unlit, unmeasured = _short_of(plan)
-    if partial.redundant is not None:
+    if partial.surviving is not None:
         # What is short with all devices there is short after a loss, too.
         return None
     if unlit:

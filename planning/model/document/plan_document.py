@@ -28,7 +28,7 @@ from .input_records import (
     Units,
 )
 from .part import Part
-from .redundancy_records import RedundancyRecord
+from .survival_records import SurvivalRecord
 
 FORMAT = "ringrig-plan"
 VERSION = 1
@@ -97,7 +97,7 @@ class PlanDocument(Part):
     ranges: RangesRecord | None = None
     evaluation: EvaluationRecord | None = None
     robust: RobustRecord | None = None
-    redundancy: RedundancyRecord | None = None
+    survival: SurvivalRecord | None = None
     camera_groups: tuple[tuple[str, ...], ...] = ()
     cost: CostRecord
     members: tuple[MemberRecord, ...]

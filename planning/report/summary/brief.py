@@ -18,15 +18,15 @@ from .cause_words import causes_line
 from .check_lines import error_words, unchecked
 from .device_lines import axis_name, models_line, standing, used_up
 from .proof_lines import user_selection
-from .redundancy_lines import (
-    proof_words,
-    redundancy_cost,
-    worst_losses,
-)
 from .region_lines import worst_region
 from .robust_lines import robust_cost
 from .shortfall import Shortfall, missing
 from .summary import lost_in_field
+from .survival_lines import (
+    proof_words,
+    survival_cost,
+    worst_losses,
+)
 from .warning_lines import warnings
 
 MOST_LINES, COLUMNS = 25, 100
@@ -51,7 +51,7 @@ def brief(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
         *([("MODELS", models, 3)] if models else []),
         *_measured(plan),
         *_fewest(plan),
-        *_redundant(plan),
+        *_surviving(plan),
         *_robust(plan),
         *_missed(plan, short),
         *_check(plan),
@@ -185,9 +185,9 @@ def _fewest(plan: RigPlan) -> Iterator[_Block]:
         return
     proofs = plan.document.certificates
     kinds = {"projector": proofs.projectors, "camera": proofs.cameras}
-    if (redundant := plan.document.redundancy) is not None:
+    if (surviving := plan.document.survival) is not None:
         for label, kind in zip(("FEWEST", ""), kinds, strict=True):
-            if count := getattr(redundant, f"{kind}s"):
+            if count := getattr(surviving, f"{kind}s"):
                 yield label, proof_words(kind, count), 2
         return
     if all(_over_all(proof) for proof in kinds.values()):
@@ -203,12 +203,12 @@ def _fewest(plan: RigPlan) -> Iterator[_Block]:
         yield label, _proved(kind, proof, used_up(plan.document, kind)), 2
 
 
-def _redundant(plan: RigPlan) -> Iterator[_Block]:
+def _surviving(plan: RigPlan) -> Iterator[_Block]:
     """Say what any one loss leaves, and what it costs to stand it."""
-    record, asked = plan.document.redundancy, plan.requirements.redundancy
+    record, asked = plan.document.survival, plan.requirements.survival
     if record is None or asked is None:
         return
-    parts = (worst_losses(plan), redundancy_cost(record, asked))
+    parts = (worst_losses(plan), survival_cost(record, asked))
     yield "LOSSES" if asked.survive else "VIEWS", "; ".join(filter(None, parts)), 2
 
 

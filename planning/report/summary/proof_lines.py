@@ -6,7 +6,7 @@ from planning.model.plan import RigPlan
 from planning.model.words import count_words, percent
 from planning.scene.lights import light_of
 
-from .redundancy_lines import redundant_proofs
+from .survival_lines import surviving_proofs
 
 _EXCLUDED = {
     "projector_beam": "lie outside the beam",
@@ -37,7 +37,7 @@ def proof_lines(plan: RigPlan) -> list[str]:
         _proof(plan, "camera", requirements.coverage, "measure")
         + " (given these projectors)",
         _continuous(proofs.cameras, "position, aim and roll" + _of_any(plan, "camera")),
-        *redundant_proofs(plan),
+        *surviving_proofs(plan),
         *route_lines(proofs.cameras),
         f"         {_regions(plan)}",
         *_excluded(proofs.projectors),

@@ -10,10 +10,10 @@ from .coverage_lines import coverage_lines, marginal_lines, schedule_lines
 from .device_lines import device_lines, gap_lines, mount_lines
 from .light_lines import light_lines
 from .proof_lines import proof_lines
-from .redundancy_lines import redundancy_lines
 from .region_lines import region_table
 from .ring_lines import range_lines, ring_lines
 from .robust_lines import robust_lines
+from .survival_lines import survival_lines
 from .zone_lines import zone_lines
 
 
@@ -56,7 +56,7 @@ SECTIONS = (
         lambda plan: [
             *coverage_lines(plan),
             *light_lines(plan),
-            *redundancy_lines(plan),
+            *survival_lines(plan),
             *robust_lines(plan),
         ],
     ),

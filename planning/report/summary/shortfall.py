@@ -9,15 +9,15 @@ from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
 from planning.model.requirements import Requirements
 from planning.model.words import area_words, percent
-from planning.report.redundancy_claims import falls_short_after
+from planning.report.survival_claims import falls_short_after
 from planning.scene.limits.limit import causes
 from planning.scene.limits.pair_limits import MEASURED_LIMITS
 from planning.scene.limits.projector_limits import PROJECTOR_LIMITS
 
 from .cause_words import areas_line, causes_line, rounded_down
 from .device_lines import used_up
-from .redundancy_lines import lit_share, measured_share, pairs_words
 from .region_lines import floor_shortfalls
+from .survival_lines import lit_share, measured_share, pairs_words
 
 # What accepts the one requirement that a plan misses.
 _ACCEPTS = " accepts this plan"
@@ -66,7 +66,7 @@ def _missing(plan: RigPlan) -> Iterator[Shortfall]:
     yield from _reachable(plan.document, required)
     yield from _covered(plan.document, required)
     yield from _floors(plan)
-    yield from _redundant(plan)
+    yield from _surviving(plan)
     yield from _robust(plan.document, required)
     if check is not None and not check.passed:
         for failure in check.failures:
@@ -79,10 +79,10 @@ def _floors(plan: RigPlan) -> Iterator[Shortfall]:
         yield Shortfall(figure, missed, helps, ", or ")
 
 
-def _redundant(plan: RigPlan) -> Iterator[Shortfall]:
+def _surviving(plan: RigPlan) -> Iterator[Shortfall]:
     """Whether what is left after each loss meets what is asked of all."""
-    record, required = plan.document.redundancy, plan.requirements
-    asked = required.redundancy
+    record, required = plan.document.survival, plan.requirements
+    asked = required.survival
     if record is None or asked is None:
         return
     helps = tuple(

@@ -16,9 +16,9 @@ from .coverage_lines import coverage_lines, marginal_lines
 from .device_lines import axis_name, device_lines, mount_lines
 from .light_lines import light_lines
 from .proof_lines import proof_lines
-from .redundancy_lines import redundancy_lines
 from .ring_lines import range_lines, ring_lines
 from .robust_lines import robust_lines
+from .survival_lines import survival_lines
 from .warning_lines import warning_lines
 
 # An object under this share of the field is taken to be in another unit.
@@ -43,7 +43,7 @@ def summary(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
         *proof_lines(plan),
         *coverage_lines(plan),
         *light_lines(plan),
-        *redundancy_lines(plan),
+        *survival_lines(plan),
         *robust_lines(plan),
         *range_lines(plan.document),
         *ring_lines(plan),

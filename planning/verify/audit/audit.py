@@ -26,13 +26,13 @@ from planning.verify.audit.counts.table_claims import (
 from planning.verify.audit.coverage.area_claims import audit_areas, recomputed_areas
 from planning.verify.audit.coverage.floor_claims import audit_floors
 from planning.verify.audit.coverage.inside_claims import audit_inside
-from planning.verify.audit.coverage.redundancy_claims import (
-    audit_redundancy,
-    unmet_after_losses,
-)
 from planning.verify.audit.coverage.region_claims import audit_margins, audit_regions
 from planning.verify.audit.coverage.robust_claims import audit_robust
 from planning.verify.audit.coverage.sigma_claims import audit_sigma
+from planning.verify.audit.coverage.survival_claims import (
+    audit_survival,
+    unmet_after_losses,
+)
 from planning.verify.audit.devices.body_claims import audit_bodies, audit_clearance
 from planning.verify.audit.devices.device_claims import audit_devices, audit_existing
 from planning.verify.audit.devices.evaluation_claims import audit_evaluation
@@ -65,7 +65,7 @@ _CLAIMS = (
     audit_inside,
     audit_sigma,
     audit_robust,
-    audit_redundancy,
+    audit_survival,
     audit_margins,
     audit_regions,
     audit_floors,

@@ -5,9 +5,9 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from solvers.redundant.exchanges import Exchanges
-from solvers.redundant.fewest_redundant import least_redundant, solve_redundant
-from solvers.redundant.redundant_cover import RedundantCover
+from solvers.surviving.exchanges import Exchanges
+from solvers.surviving.fewest_surviving import least_surviving, solve_surviving
+from solvers.surviving.surviving_cover import SurvivingCover
 
 
 def random_cover(seed):
@@ -26,7 +26,7 @@ def random_cover(seed):
         [0, *(int(0.5 * (mask & (row_sets == r)).sum()) for r in (1, 2))]
         for mask in reached
     ]
-    return RedundantCover.of(
+    return SurvivingCover.of(
         cases,
         [int(0.7 * mask.sum()) for mask in reached],
         need=need,
@@ -74,8 +74,8 @@ def fewest(cover):
 def test_as_few_as_all_selections_allow(seed):
     cover = random_cover(seed)
     truth = fewest(cover)
-    found = solve_redundant(
-        cover, lower_bound=least_redundant(cover, budget=1e5), kicks=6
+    found = solve_surviving(
+        cover, lower_bound=least_surviving(cover, budget=1e5), kicks=6
     )
     if truth is None:
         assert found.status == "infeasible"
@@ -105,8 +105,8 @@ def test_two_sets_that_halve_a_sphere_take_two_more():
     half[:5, ::2] = half[5:, 1::2] = 1
     for share, truth in ((10, 4), (5, 2)):
         # Half of it asked: without one of two the other half is left.
-        cover = RedundantCover.of([half], [share])
-        found = solve_redundant(cover, lower_bound=least_redundant(cover, budget=1e5))
+        cover = SurvivingCover.of([half], [share])
+        found = solve_surviving(cover, lower_bound=least_surviving(cover, budget=1e5))
         assert (len(found.selected), found.status) == (
             truth,
             "optimal" if truth == 2 else "feasible",
@@ -116,22 +116,22 @@ def test_two_sets_that_halve_a_sphere_take_two_more():
 def test_one_set_more_than_a_cover_is_proved_where_it_suffices():
     # Any two of three cover all, so that one of three may go.
     serves = ~np.eye(3, dtype=bool)
-    cover = RedundantCover.of([np.repeat(serves, 2, axis=0).astype(np.uint8)], [6])
-    found = solve_redundant(cover, lower_bound=least_redundant(cover, budget=1e5))
+    cover = SurvivingCover.of([np.repeat(serves, 2, axis=0).astype(np.uint8)], [6])
+    found = solve_surviving(cover, lower_bound=least_surviving(cover, budget=1e5))
     assert (len(found.selected), found.status, found.lower_bound) == (3, "optimal", 3)
 
 
 def test_pairs_count_as_often_as_they_serve():
     # The first set serves all with two others, as two of the rest do together.
     serves = np.array([[2, 1, 1, 0], [2, 1, 1, 1], [2, 0, 1, 1]], dtype=np.uint8)
-    cover = RedundantCover.of([serves], [3], need=2, losable=False)
-    found = solve_redundant(cover, lower_bound=least_redundant(cover, budget=1e5))
+    cover = SurvivingCover.of([serves], [3], need=2, losable=False)
+    found = solve_surviving(cover, lower_bound=least_surviving(cover, budget=1e5))
     assert (found.selected.tolist(), found.status) == ([0], "optimal")
-    more = RedundantCover.of([serves], [3], need=3, losable=False)
+    more = SurvivingCover.of([serves], [3], need=3, losable=False)
     assert (
         len(
-            solve_redundant(
-                more, lower_bound=least_redundant(more, budget=1e5)
+            solve_surviving(
+                more, lower_bound=least_surviving(more, budget=1e5)
             ).selected
         )
         == 2
@@ -141,9 +141,9 @@ def test_pairs_count_as_often_as_they_serve():
 def test_what_is_allowed_lacks_least():
     half = np.zeros((10, 4), dtype=np.uint8)
     half[:5, :2] = half[5:, 2:] = 1
-    found = solve_redundant(RedundantCover.of([half], [10]), most=3)
+    found = solve_surviving(SurvivingCover.of([half], [10]), most=3)
     assert (found.status, len(found.selected)) == ("infeasible", 3)
     with pytest.raises(ValueError, match="need must be 1 or more"):
-        RedundantCover.of([half], [10], need=0)
+        SurvivingCover.of([half], [10], need=0)
     with pytest.raises(ValueError, match="required must be"):
-        RedundantCover.of([half, half], [10])
+        SurvivingCover.of([half, half], [10])

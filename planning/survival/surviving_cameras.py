@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from planning.cameras.camera_cover import CameraCover, n_fixed
 from planning.cameras.proved_cameras import CameraStage
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.model.redundancy import Redundancy
+from planning.model.survival import Survival
 from planning.proofs.candidate_certificate import counted
 from planning.proofs.device_stock import DeviceStock
 from planning.proofs.losses import PairDemand
@@ -19,14 +19,14 @@ from planning.scene.measured import lit_samples
 from planning.scene.measuring_pairs import measuring_pairs, pair_counts
 from planning.scene.samples import Target, merged
 from planning.scene.scene import Scene
-from solvers.redundant.fewest_redundant import (
-    RedundantSolution,
-    least_redundant,
-    solve_redundant,
+from solvers.surviving.fewest_surviving import (
+    SurvivingSolution,
+    least_surviving,
+    solve_surviving,
 )
-from solvers.redundant.redundant_cover import RedundantCover
+from solvers.surviving.surviving_cover import SurvivingCover
 
-from .redundant_counts import RedundantCount, larger_selections
+from .surviving_counts import SurvivingCount, larger_selections
 
 _Mask = NDArray[np.bool_]
 _Index = NDArray[np.int64]
@@ -40,18 +40,18 @@ _AIMED = 1.0
 _BUDGET = 1e8
 
 
-def redundant_cameras(
+def surviving_cameras(
     scene: Scene,
     projectors: Sequence[PlannedProjector],
     stage: CameraStage,
-    asked: Redundancy,
+    asked: Survival,
     without: int,
-) -> tuple[CameraStage, RedundantCount]:
-    """Return the stage with the fewest cameras found that redundancy asks for.
+) -> tuple[CameraStage, SurvivingCount]:
+    """Return the stage with the fewest cameras found that survival asks for.
 
     A camera counts for a sample as often as it measures it with different projectors.
     With a projector lost, the others and what they light are a case of its own; a
-    camera may be lost as any set of the cover. `without` redundancy so many do.
+    camera may be lost as any set of the cover. `without` survival so many do.
     """
     offered, allowed = stage.cover.candidates, scene.requirements.max_cameras
     target = scene.target_samples(DRAWS.cameras)
@@ -59,11 +59,11 @@ def redundant_cameras(
     place = {id(camera): c for c, camera in enumerate(offered.cameras)}
     start = np.array(sorted(place[id(one)] for one in stage.cameras), dtype=np.int64)
     plain = stage.certificate.needed.lower_bound + asked.survive
-    bound = max(plain, least_redundant(pairs.cover(), budget=_BUDGET))
+    bound = max(plain, least_surviving(pairs.cover(), budget=_BUDGET))
     pairs, enough, found = _confirmed(scene, projectors, stage, pairs, start, bound)
     cameras = tuple(offered.cameras[c] for c in found.selected)
     more = larger_selections(pairs.cover(), found.selected, allowed)
-    count = RedundantCount(
+    count = SurvivingCount(
         needed=max(len(enough.selected), len(cameras)),
         without=without,
         lower_bound=min(bound, len(enough.selected)),
@@ -84,7 +84,7 @@ def _confirmed(
     pairs: "_PairsOfAll",
     start: _Index,
     bound: int,
-) -> tuple["_PairsOfAll", RedundantSolution, RedundantSolution]:
+) -> tuple["_PairsOfAll", SurvivingSolution, SurvivingSolution]:
     """Return what is enough, and what is allowed of it, when fresh samples agree.
 
     Where they don't they join the samples, a few times.
@@ -99,7 +99,7 @@ def _confirmed(
             found = _solved(scene, cover, start, allowed, allowed)
         if found.status == "infeasible" or attempt == _ROUNDS:
             return pairs, enough, found
-        draw = DRAWS.redundant_cameras.later(attempt)
+        draw = DRAWS.surviving_cameras.later(attempt)
         fresh = _PairsOfAll.on(scene, projectors, stage, scene.target_samples(draw))
         if fresh.demand(0.0).met(fresh.pairs[:, start]):
             return pairs, enough, found
@@ -107,15 +107,15 @@ def _confirmed(
 
 
 def _solved(
-    scene: Scene, cover: RedundantCover, start: _Index, least: int, most: int
-) -> RedundantSolution:
-    return solve_redundant(
+    scene: Scene, cover: SurvivingCover, start: _Index, least: int, most: int
+) -> SurvivingSolution:
+    return solve_surviving(
         cover, lower_bound=least, most=most, start=start, seed=scene.seed
     )
 
 
 def _everywhere(
-    stage: CameraStage, cameras: tuple[PlannedCamera, ...], asked: Redundancy
+    stage: CameraStage, cameras: tuple[PlannedCamera, ...], asked: Survival
 ) -> int | None:
     """What is proved over all poses: of covers, and of one more where one may go."""
     bound = stage.certificate.continuous
@@ -162,8 +162,8 @@ class _PairsOfAll:
         return cls(scene, offered.cameras, samples.target, regions, pairs)
 
     @property
-    def _asked(self) -> Redundancy:
-        return self.scene.requirements.redundancy or Redundancy()
+    def _asked(self) -> Survival:
+        return self.scene.requirements.survival or Survival()
 
     def with_samples(self, other: "_PairsOfAll") -> "_PairsOfAll":
         """Return the pairs on the samples of both."""
@@ -191,11 +191,11 @@ class _PairsOfAll:
         )
         return PairDemand.of(self._asked, self.regions, reached, share, spare=spare)
 
-    def cover(self) -> RedundantCover:
+    def cover(self) -> SurvivingCover:
         """State the cover."""
         demand, required = self.demand(_AIMED), self.scene.requirements
         stock = DeviceStock.of(self.cameras, required.stock_of("camera"))
-        return RedundantCover.of(
+        return SurvivingCover.of(
             self.cases(),
             [quotas.total for quotas in demand.quotas],
             need=self._asked.views,

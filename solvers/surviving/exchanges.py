@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .redundant_cover import RedundantCover
+from .surviving_cover import SurvivingCover
 
 _Index = NDArray[np.int64]
 # Lacking elements, then what the loss that leaves least to spare has over, negated.
@@ -25,9 +25,9 @@ Rank = tuple[int, int]
 
 @dataclass(frozen=True, eq=False)
 class Exchanges:
-    """A redundant cover with its matrices laid out for exchanges."""
+    """A surviving cover with its matrices laid out for exchanges."""
 
-    cover: RedundantCover
+    cover: SurvivingCover
 
     @cached_property
     def _groups(self) -> list[_Index]:

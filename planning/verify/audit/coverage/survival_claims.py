@@ -1,6 +1,6 @@
 """Claims of what is left of the target after the loss of any one device.
 
-`docs/reference/semantics.md`, "Redundancy". What each pair measures is the audit's own,
+`docs/reference/semantics.md`, "Survival". What each pair measures is the audit's own,
 device by device; so are reference cameras, of which several may be needed for a sample.
 """
 
@@ -10,13 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from geometry.arrays import Ints, Mask
-from planning.model.document.redundancy_records import (
+from planning.model.document.survival_records import (
     LossRecord,
-    RedundancyRecord,
-    RedundantCountRecord,
+    SurvivalRecord,
+    SurvivingCountRecord,
 )
 from planning.model.plan import RigPlan
-from planning.model.redundancy import Redundancy
+from planning.model.survival import Survival
 from planning.verify.audit.audit_case import AuditCase, DeviceKind
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.estimates import POINT, ROUNDING, share_error
@@ -46,15 +46,15 @@ class _Rest:
     cameras: Mask
 
 
-def audit_redundancy(case: AuditCase, findings: AuditFindings) -> None:
+def audit_survival(case: AuditCase, findings: AuditFindings) -> None:
     """Check what each loss leaves, and the numbers of devices, if that is claimed."""
-    record, asked = case.plan.document.redundancy, case.plan.requirements.redundancy
-    below = findings.at("redundancy")
+    record, asked = case.plan.document.survival, case.plan.requirements.survival
+    below = findings.at("survival")
     if record is None and asked is None:
         return
     if record is None or asked is None or not asked.asks:
         below.fail(
-            "", "there without the other: `redundancy` and `requirements.redundancy`"
+            "", "there without the other: `survival` and `requirements.survival`"
         )
         return
     names = _names(case.plan, asked)
@@ -75,7 +75,7 @@ def audit_redundancy(case: AuditCase, findings: AuditFindings) -> None:
 
 def unmet_after_losses(plan: RigPlan) -> Iterator[str]:
     """Yield a sentence for each requirement that isn't met after a loss, as claimed."""
-    record, limits = plan.document.redundancy, plan.requirements
+    record, limits = plan.document.survival, plan.requirements
     for loss in record.losses if record is not None else ():
         by_cameras = loss.reachable_by_cameras_m2
         rules = (
@@ -101,12 +101,12 @@ def unmet_after_losses(plan: RigPlan) -> Iterator[str]:
             )
 
 
-def _names(plan: RigPlan, asked: Redundancy) -> list[str | None]:
+def _names(plan: RigPlan, asked: Survival) -> list[str | None]:
     devices = (*plan.projectors, *plan.cameras) if asked.survive else ()
     return [None, *(device.id for device in devices)]
 
 
-def _rests(case: AuditCase, actual: Recomputed, asked: Redundancy) -> Iterator[_Rest]:
+def _rests(case: AuditCase, actual: Recomputed, asked: Survival) -> Iterator[_Rest]:
     """Yield what is left with all there, then without each of the devices."""
     pairs, lit_by = actual.pairs == MEASURED, actual.lit_by
     reached = _reached(case.plan, actual, case.shadow, asked, case.seed)
@@ -128,7 +128,7 @@ def _rests(case: AuditCase, actual: Recomputed, asked: Redundancy) -> Iterator[_
 
 
 def _reached(
-    plan: RigPlan, actual: Recomputed, shadow: Shadow, asked: Redundancy, seed: int
+    plan: RigPlan, actual: Recomputed, shadow: Shadow, asked: Survival, seed: int
 ) -> list[Mask]:
     """Return what could be measured as often as asked: in full, without each projector.
 
@@ -201,8 +201,8 @@ def _audit_loss(
 
 def _audit_floors(
     case: AuditCase,
-    record: RedundancyRecord,
-    asked: Redundancy,
+    record: SurvivalRecord,
+    asked: Survival,
     findings: AuditFindings,
 ) -> None:
     """Check which regions are said to fall below their floor, more than by chance."""
@@ -257,8 +257,8 @@ def _share(
 
 def _audit_count(
     kind: DeviceKind,
-    claims: RedundantCountRecord,
-    asked: Redundancy,
+    claims: SurvivingCountRecord,
+    asked: Survival,
     findings: AuditFindings,
 ) -> None:
     """Check numbers of devices against each other and against the certificate.

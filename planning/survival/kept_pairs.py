@@ -26,10 +26,10 @@ def rings_uphold(
 
     A finer gap measures nothing more, but pairs to spare may be lost by it.
     """
-    asked = scene.requirements.redundancy
+    asked = scene.requirements.survival
     if asked is None:
         return True
-    target = scene.target_samples(DRAWS.redundant_rings)
+    target = scene.target_samples(DRAWS.surviving_rings)
     samples = lit_samples(scene, before, target)
     renewed = samples
     for p, projector in enumerate(after):

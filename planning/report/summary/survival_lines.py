@@ -2,20 +2,20 @@
 
 from collections.abc import Iterator
 
-from planning.model.document.redundancy_records import (
+from planning.model.document.survival_records import (
     LossRecord,
-    RedundancyRecord,
-    RedundantCountRecord,
+    SurvivalRecord,
+    SurvivingCountRecord,
 )
 from planning.model.plan import RigPlan
-from planning.model.redundancy import Redundancy
+from planning.model.survival import Survival
 from planning.model.words import count_words, labelled, percent
-from planning.report.redundancy_claims import falls_short_after
+from planning.report.survival_claims import falls_short_after
 
 
-def redundancy_lines(plan: RigPlan) -> list[str]:
+def survival_lines(plan: RigPlan) -> list[str]:
     """Return what is left after each loss, and what that costs."""
-    record, asked = plan.document.redundancy, plan.requirements.redundancy
+    record, asked = plan.document.survival, plan.requirements.survival
     if record is None or asked is None:
         return []
     width = max(len(loss.lost or "all there") for loss in record.losses)
@@ -31,14 +31,14 @@ def redundancy_lines(plan: RigPlan) -> list[str]:
     ]
     if not asked.survive:
         lines[0] = f"what counts is measured by {pairs_words(asked.views)} at least"
-    if cost := redundancy_cost(record, asked):
+    if cost := survival_cost(record, asked):
         lines.append(cost)
     return labelled("LOSSES" if asked.survive else "VIEWS", lines)
 
 
-def redundant_proofs(plan: RigPlan) -> list[str]:
-    """Return what was proved of the numbers that redundancy takes, a line a kind."""
-    record, asked = plan.document.redundancy, plan.requirements.redundancy
+def surviving_proofs(plan: RigPlan) -> list[str]:
+    """Return what was proved of the numbers that survival takes, a line a kind."""
+    record, asked = plan.document.survival, plan.requirements.survival
     if record is None or asked is None:
         return []
     return [
@@ -49,7 +49,7 @@ def redundant_proofs(plan: RigPlan) -> list[str]:
     ]
 
 
-def proof_words(kind: str, count: RedundantCountRecord) -> str:
+def proof_words(kind: str, count: SurvivingCountRecord) -> str:
     """Return what was proved of a number of devices."""
     devices, least = count_words(count.count, kind), count.lower_bound
     everywhere = count.everywhere
@@ -61,7 +61,7 @@ def proof_words(kind: str, count: RedundantCountRecord) -> str:
     return f"{devices}; at least {least} of the candidates are needed{over}"
 
 
-def purpose(asked: Redundancy) -> str:
+def purpose(asked: Survival) -> str:
     """Say what for devices are counted."""
     parts: list[str] = []
     if asked.survive:
@@ -71,13 +71,13 @@ def purpose(asked: Redundancy) -> str:
     return " and ".join(parts)
 
 
-def is_fewest(count: RedundantCountRecord) -> bool:
+def is_fewest(count: SurvivingCountRecord) -> bool:
     """Whether no fewer devices are enough, which was proved over the candidates."""
     return count.count == count.needed <= count.lower_bound
 
 
-def redundancy_cost(record: RedundancyRecord, asked: Redundancy) -> str:
-    """Return how many devices more redundancy takes; nothing where none was sought."""
+def survival_cost(record: SurvivalRecord, asked: Survival) -> str:
+    """Return how many devices more survival takes; nothing where none was sought."""
     counts = list(_counts(record))
     if not counts:
         return ""
@@ -99,7 +99,7 @@ def redundancy_cost(record: RedundancyRecord, asked: Redundancy) -> str:
 
 def worst_losses(plan: RigPlan) -> str:
     """Return after which loss least is lit, and after which least is measured."""
-    record = plan.document.redundancy
+    record = plan.document.survival
     losses = [loss for loss in record.losses if loss.lost] if record else []
     if not losses:
         return ""
@@ -127,7 +127,7 @@ def pairs_words(views: int) -> str:
     return "one pair" if views == 1 else f"{views} pairs"
 
 
-def _counts(record: RedundancyRecord) -> Iterator[tuple[str, RedundantCountRecord]]:
+def _counts(record: SurvivalRecord) -> Iterator[tuple[str, SurvivingCountRecord]]:
     for kind in ("projector", "camera"):
         count = getattr(record, f"{kind}s")
         if count is not None:

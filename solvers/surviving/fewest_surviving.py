@@ -1,4 +1,4 @@
-"""Fewest sets of a redundant cover: from below by covers, from above by exchanges.
+"""Fewest sets of a surviving cover: from below by covers, from above by exchanges.
 
 For each number of sets from the bound upwards, a selection is completed set by set and
 improved by the best exchange of one set until none helps; then some sets are thrown
@@ -17,7 +17,7 @@ from solvers.covers.cover_problem import CoverProblem
 from solvers.status import SolveStatus
 
 from .exchanges import Exchanges, Rank
-from .redundant_cover import RedundantCover
+from .surviving_cover import SurvivingCover
 
 _Index = NDArray[np.int64]
 # Times that sets are thrown out of the best selection, for each number of them.
@@ -28,8 +28,8 @@ _HOPEFUL, _LEAST = 0.03, 2
 
 
 @dataclass(frozen=True, eq=False)
-class RedundantSolution:
-    """Answer of :func:`solve_redundant`.
+class SurvivingSolution:
+    """Answer of :func:`solve_surviving`.
 
     Attributes:
         cover: The problem this answers.
@@ -39,22 +39,22 @@ class RedundantSolution:
             selection is any better isn't proved.
     """
 
-    cover: RedundantCover
+    cover: SurvivingCover
     selected: _Index
     lower_bound: int
     status: Literal["optimal", "feasible", "infeasible"]
 
 
-def solve_redundant(
-    cover: RedundantCover,
+def solve_surviving(
+    cover: SurvivingCover,
     *,
     lower_bound: int = 0,
     most: int | None = None,
     start: _Index | None = None,
     kicks: int = KICKS,
     seed: int = 0,
-) -> RedundantSolution:
-    """Find few sets that meet a redundant cover, and bound their number.
+) -> SurvivingSolution:
+    """Find few sets that meet a surviving cover, and bound their number.
 
     Args:
         cover: The problem.
@@ -69,7 +69,7 @@ def solve_redundant(
     allowed = min(cover.n_sets, int(cover.stock.sum()))
     allowed = allowed if most is None else min(allowed, most)
     if fixed.size and cover.lacking(fixed) == 0:
-        return RedundantSolution(cover, fixed, fixed.size, "optimal")
+        return SurvivingSolution(cover, fixed, fixed.size, "optimal")
     bound = max(lower_bound, fixed.size + 1)
     best = np.union1d(fixed, np.empty(0, np.int64) if start is None else start)
     best = best.astype(np.int64)
@@ -84,14 +84,14 @@ def solve_redundant(
     (lacking, _), chosen = least
     chosen = np.sort(chosen)
     if lacking or cover.lacking(chosen):
-        return RedundantSolution(cover, chosen, bound, "infeasible")
+        return SurvivingSolution(cover, chosen, bound, "infeasible")
     optimal = len(chosen) <= bound
     status: Literal["optimal", "feasible"] = "optimal" if optimal else "feasible"
-    return RedundantSolution(cover, chosen, min(bound, len(chosen)), status)
+    return SurvivingSolution(cover, chosen, min(bound, len(chosen)), status)
 
 
-def least_redundant(
-    cover: RedundantCover, *, seed: int = 0, budget: float = DEFAULT_BUDGET
+def least_surviving(
+    cover: SurvivingCover, *, seed: int = 0, budget: float = DEFAULT_BUDGET
 ) -> int:
     """Return a proven least number of sets, by plain covers of each case.
 
@@ -109,7 +109,7 @@ def least_redundant(
 
 
 def _plain_bound(
-    cover: RedundantCover,
+    cover: SurvivingCover,
     case: int,
     serves: NDArray[np.uint8],
     seed: int,
@@ -161,7 +161,7 @@ def _search(
     return best
 
 
-def _asked(cover: RedundantCover, count: int) -> int:
+def _asked(cover: SurvivingCover, count: int) -> int:
     """What all losses of so many sets must leave together."""
     times = count if cover.losable else 1
     return int(cover.required[0]) * times + int(cover.required[1:].sum())

@@ -1,4 +1,4 @@
-"""How many devices redundancy takes, what that costs, and what was proved of it."""
+"""How many devices survival takes, what that costs, and what was proved of it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,20 +7,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.redundant.exchanges import Exchanges
-from solvers.redundant.redundant_cover import RedundantCover
+from solvers.surviving.exchanges import Exchanges
+from solvers.surviving.surviving_cover import SurvivingCover
 
 # Devices beyond those taken that are kept at hand, for fresh samples that fall short.
 _AT_HAND = 2
 
 
 @dataclass(frozen=True, eq=False)
-class RedundantCount:
-    """The devices of a kind that redundancy takes.
+class SurvivingCount:
+    """The devices of a kind that survival takes.
 
     Attributes:
         needed: So many were found to be enough, of however many are allowed.
-        without: As many do without redundancy, of the same candidates.
+        without: As many do without survival, of the same candidates.
         lower_bound: Proven least number of candidates.
         everywhere: Proven least number over all poses; None: not looked for.
         more: The best found of larger numbers.
@@ -36,7 +36,7 @@ class RedundantCount:
 
 
 def larger_selections(
-    cover: RedundantCover, selected: NDArray[np.int64], most: int | None
+    cover: SurvivingCover, selected: NDArray[np.int64], most: int | None
 ) -> dict[int, NDArray[np.int64]]:
     """Return selections with a set more each, the one that leaves most to spare."""
     exchanges, found = Exchanges(cover), dict[int, NDArray[np.int64]]()

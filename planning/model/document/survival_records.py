@@ -24,13 +24,13 @@ class LossRecord(Part):
     floors_missed: tuple[int, ...] = ()
 
 
-class RedundantCountRecord(Part):
-    """What redundancy costs of a kind of device, and what is proved of it.
+class SurvivingCountRecord(Part):
+    """What survival costs of a kind of device, and what is proved of it.
 
     Attributes:
         count: Devices of the plan.
         needed: So many are enough for the candidates' samples.
-        without: As many do without redundancy, of the same candidates.
+        without: As many do without survival, of the same candidates.
         lower_bound: Proven least number over the candidates.
         everywhere: The same over every pose of the workspace; None: not looked for.
     """
@@ -42,8 +42,8 @@ class RedundantCountRecord(Part):
     everywhere: int | None = None
 
 
-class RedundancyRecord(Part):
-    """What `requirements.redundancy` asks for, device by device.
+class SurvivalRecord(Part):
+    """What `requirements.survival` asks for, device by device.
 
     Attributes:
         samples: Fresh samples of the target behind the areas.
@@ -54,5 +54,5 @@ class RedundancyRecord(Part):
 
     samples: int
     losses: tuple[LossRecord, ...]
-    projectors: RedundantCountRecord | None = None
-    cameras: RedundantCountRecord | None = None
+    projectors: SurvivingCountRecord | None = None
+    cameras: SurvivingCountRecord | None = None

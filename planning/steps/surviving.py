@@ -1,7 +1,7 @@
 """Projectors and cameras of which any may be lost, after the fewest that measure once.
 
 What is asked beyond one pair is a layer over the plan that asks for one: its covers
-give candidates, bounds and what redundancy costs.
+give candidates, bounds and what survival costs.
 """
 
 from dataclasses import replace
@@ -13,19 +13,19 @@ from planning.model.errors import InputError
 from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
 from planning.projectors.projector_stage import ProjectorStage
-from planning.proofs import camera_bound
+from planning.proofs import camera_bound, projector_bound
 from planning.proofs.candidate_certificate import counted
-from planning.redundancy.redundant_cameras import redundant_cameras
-from planning.redundancy.redundant_counts import RedundantCount
-from planning.redundancy.redundant_projectors import redundant_projectors
 from planning.report.partial_plan import PartialPlan, PlanRequest, Prepared
-from planning.report.redundancy_claims import falls_short_after
+from planning.report.survival_claims import falls_short_after
+from planning.survival.surviving_cameras import surviving_cameras
+from planning.survival.surviving_counts import SurvivingCount
+from planning.survival.surviving_projectors import surviving_projectors
 
 from .stages import placed
 
 
-def check_redundancy(request: PlanRequest) -> None:
-    """Refuse what redundancy can't be asked together with.
+def check_survival(request: PlanRequest) -> None:
+    """Refuse what survival can't be asked together with.
 
     Raises:
         InputError: It names both, and what to do.
@@ -48,22 +48,29 @@ def check_redundancy(request: PlanRequest) -> None:
             )
 
 
-def placed_redundantly(
+def placed_to_survive(
     ready: Prepared, stage: ProjectorStage, clock: Stopwatch
 ) -> PartialPlan:
-    """Return the projectors and cameras that redundancy asks for.
+    """Return the projectors and cameras that survival asks for.
 
     Raises:
         InfeasibleLimitsError: If no camera measures any lit sample.
     """
-    asked = ready.scene.requirements.redundancy
+    asked = ready.scene.requirements.survival
     assert asked is not None
     lights = _once(stage)
     without: int | None = None
     if asked.survive:
-        with clock.stage("redundancy", "redundancy: projectors that may be lost"):
+        with clock.stage("survival", "survival: projectors that may be lost"):
             without = _cameras_without(ready, stage)
-            stage, lights = redundant_projectors(ready.scene, stage, ready.templates)
+            effort = (
+                projector_bound.PROVE
+                if ready.request.prove
+                else projector_bound.DEFAULT
+            )
+            stage, lights = surviving_projectors(
+                ready.scene, stage, ready.templates, effort
+            )
             _say(lights, "projectors", len(stage.projectors), clock)
     return _with_cameras(ready, stage, lights, without, clock)
 
@@ -71,12 +78,12 @@ def placed_redundantly(
 def _with_cameras(
     ready: Prepared,
     stage: ProjectorStage,
-    lights: RedundantCount,
+    lights: SurvivingCount,
     without: int | None,
     clock: Stopwatch,
 ) -> PartialPlan:
     """Poses of widest margin for projectors that are counted, and cameras for them."""
-    asked = ready.scene.requirements.redundancy
+    asked = ready.scene.requirements.survival
     assert asked is not None
     partial = placed(ready, stage, clock)
     plain = partial.camera_stage
@@ -85,9 +92,9 @@ def _with_cameras(
         request = ready.request
         effort = camera_bound.PROVE if request.prove else camera_bound.DEFAULT
         plain = bound_stage(partial.scene, plain, request.rig.optics[1], effort)
-    with clock.stage("redundancy", "redundancy: cameras"):
+    with clock.stage("survival", "survival: cameras"):
         scene = partial.scene.among(partial.projectors)
-        cameras, views = redundant_cameras(
+        cameras, views = surviving_cameras(
             scene, partial.projectors, plain, asked, without
         )
         _say(views, "cameras", len(cameras.cameras), clock)
@@ -95,22 +102,22 @@ def _with_cameras(
         partial,
         camera_stage=cameras,
         cameras=cameras.cameras,
-        redundant=(lights, views),
+        surviving=(lights, views),
     )
 
 
-def _say(count: RedundantCount, kind: str, taken: int, clock: Stopwatch) -> None:
+def _say(count: SurvivingCount, kind: str, taken: int, clock: Stopwatch) -> None:
     clock.say(
         f"  {taken} {kind}, {count.without} without; at least {count.lower_bound} of "
         f"the candidates are needed"
     )
 
 
-def _once(stage: ProjectorStage) -> RedundantCount:
+def _once(stage: ProjectorStage) -> SurvivingCount:
     """The count of projectors that none may be lost of."""
     proof = stage.certificate
     bound = proof.continuous
-    return RedundantCount(
+    return SurvivingCount(
         needed=proof.needed.count,
         without=proof.needed.count,
         lower_bound=proof.needed.lower_bound,
@@ -144,7 +151,7 @@ def one_more_for_losses(
     partial: PartialPlan, plan: RigPlan, clock: Stopwatch
 ) -> PartialPlan | None:
     """One device more where fresh samples don't confirm what is left after a loss."""
-    record, counts = plan.document.redundancy, partial.redundant
+    record, counts = plan.document.survival, partial.surviving
     if record is None or counts is None:
         return None
     short = [falls_short_after(loss, plan.requirements) for loss in record.losses]

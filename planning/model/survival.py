@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Redundancy:
+class Survival:
     """What is asked of a plan beyond being measured once, with all devices there.
 
     Attributes:

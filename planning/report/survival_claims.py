@@ -9,14 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.document.redundancy_records import (
+from planning.model.document.survival_records import (
     LossRecord,
-    RedundancyRecord,
-    RedundantCountRecord,
+    SurvivalRecord,
+    SurvivingCountRecord,
 )
-from planning.model.redundancy import Redundancy
 from planning.model.requirements import Requirements
-from planning.redundancy.redundant_counts import RedundantCount
+from planning.model.survival import Survival
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.measured import LitSamples
@@ -28,6 +27,7 @@ from planning.scene.measuring_pairs import (
     without_projector,
 )
 from planning.scene.scene import Scene
+from planning.survival.surviving_counts import SurvivingCount
 
 from .claims import Claims
 from .judged import Devices
@@ -47,20 +47,20 @@ class _Left:
     by_cameras: _Mask
 
 
-def redundancy_record(
+def survival_record(
     scene: Scene,
     devices: Devices,
     claims: Claims,
-    counts: tuple[RedundantCount, RedundantCount] | None,
-) -> RedundancyRecord | None:
-    """Return the plan's `redundancy`; None where none is asked for."""
-    asked = scene.requirements.redundancy
+    counts: tuple[SurvivingCount, SurvivingCount] | None,
+) -> SurvivalRecord | None:
+    """Return the plan's `survival`; None where none is asked for."""
+    asked = scene.requirements.survival
     if asked is None:
         return None
-    numbers: dict[str, RedundantCountRecord] = {}
+    numbers: dict[str, SurvivingCountRecord] = {}
     for kind, count in zip(("projectors", "cameras"), counts or (), strict=False):
         n = len(getattr(devices, kind))
-        numbers[kind] = RedundantCountRecord(
+        numbers[kind] = SurvivingCountRecord(
             count=n,
             needed=max(count.needed, n) if count.met else count.needed,
             without=count.without,
@@ -68,7 +68,7 @@ def redundancy_record(
             everywhere=count.everywhere,
         )
     losses = _losses(scene, devices, claims, asked)
-    return RedundancyRecord(
+    return SurvivalRecord(
         samples=len(claims.target_samples),
         losses=tuple(_record(left, scene, claims) for left in losses),
         **numbers,
@@ -76,7 +76,7 @@ def redundancy_record(
 
 
 def _losses(
-    scene: Scene, devices: Devices, claims: Claims, asked: Redundancy
+    scene: Scene, devices: Devices, claims: Claims, asked: Survival
 ) -> Iterator[_Left]:
     """Yield what is left with all devices there, then without each."""
     target, views = claims.region_samples.target, asked.views

@@ -9,17 +9,20 @@ from planning.model.planned import PlannedProjector
 from planning.projectors.candidate_set import CandidateSet, CandidateSource
 from planning.projectors.loss_confirmation import confirms_losses
 from planning.projectors.projector_stage import ProjectorStage
+from planning.projectors.proved_projectors import prove_fewest
+from planning.proofs.all_poses import Effort
 from planning.proofs.candidate_certificate import counted
+from planning.proofs.selection import select_fewest
 from planning.scene.draws import DRAWS
 from planning.scene.scene import Scene
-from solvers.redundant.fewest_redundant import (
+from solvers.surviving.fewest_surviving import (
     KICKS,
-    RedundantSolution,
-    solve_redundant,
+    SurvivingSolution,
+    solve_surviving,
 )
-from solvers.redundant.redundant_cover import RedundantCover
+from solvers.surviving.surviving_cover import SurvivingCover
 
-from .redundant_counts import RedundantCount, larger_selections
+from .surviving_counts import SurvivingCount, larger_selections
 
 _Index = NDArray[np.int64]
 
@@ -34,14 +37,18 @@ _SCALES = (1.0, 0.5, 0.25)
 _JOINING = 3
 
 
-def redundant_projectors(
-    scene: Scene, stage: ProjectorStage, templates: tuple[PlannedProjector, ...]
-) -> tuple[ProjectorStage, RedundantCount]:
+def surviving_projectors(
+    scene: Scene,
+    stage: ProjectorStage,
+    templates: tuple[PlannedProjector, ...],
+    effort: Effort,
+) -> tuple[ProjectorStage, SurvivingCount]:
     """Return the stage with as many projectors as stand the loss of any one.
 
     Without any one of them it is a cover still, so that the stage's own bounds, plus
     one, bound their number. Where it takes more than that, poses around those chosen
-    are offered. Fresh samples confirm the end.
+    are offered; those that are taken join the candidates, over which and over all
+    poses covers are then proved anew. Fresh samples confirm the end.
     """
     search = _Search(CandidateSource(scene, templates), len(stage.reference))
     candidates = replace(stage.candidates, scene=scene)
@@ -51,7 +58,9 @@ def redundant_projectors(
     )
     devices = candidates.of(found.selected)
     more = larger_selections(_cover(candidates), found.selected, allowed)
-    count = RedundantCount(
+    stage = _with_candidates(scene, stage, templates, devices, effort)
+    bound = _bound(stage)
+    count = SurvivingCount(
         needed=max(len(enough.selected), len(devices)),
         without=stage.certificate.needed.count,
         lower_bound=min(bound, len(enough.selected)),
@@ -59,15 +68,33 @@ def redundant_projectors(
         more={n: candidates.of(chosen) for n, chosen in more.items()},
         met=found.status != "infeasible",
     )
-    redundant = replace(stage, candidates=candidates, projectors=devices)
-    samples = candidates.samples
-    reached = float(candidates.reached.sum()) * samples.samples.weight
-    return counted(redundant, devices, reached), count
+    known, weight = stage.candidates, stage.candidates.samples.samples.weight
+    reached = float(known.reached.sum()) * weight
+    return counted(replace(stage, projectors=devices), devices, reached), count
+
+
+def _with_candidates(
+    scene: Scene,
+    stage: ProjectorStage,
+    templates: tuple[PlannedProjector, ...],
+    devices: tuple[PlannedProjector, ...],
+    effort: Effort,
+) -> ProjectorStage:
+    """Return the stage proved over its candidates and these devices, if any is new."""
+    known = {id(one) for one in stage.reference}
+    more = tuple(device for device in devices if id(device) not in known)
+    if not more:
+        return stage
+    candidates = stage.candidates.extended(more)
+    chosen = _places(candidates, stage.projectors)
+    selection = select_fewest(candidates.cover, known=chosen)
+    again = ProjectorStage.over(candidates, selection)
+    return prove_fewest(scene, again, templates, effort)
 
 
 def _confirmed(
     search: "_Search", candidates: CandidateSet, start: _Index, bound: int
-) -> tuple[CandidateSet, RedundantSolution, RedundantSolution]:
+) -> tuple[CandidateSet, SurvivingSolution, SurvivingSolution]:
     """Return what is enough, and what is allowed of it, when fresh samples agree.
 
     Where they don't some of them join the samples, a few times.
@@ -82,7 +109,7 @@ def _confirmed(
             found = _solved(candidates, start, allowed, allowed)
         if found.status == "infeasible" or attempt == _ROUNDS:
             return candidates, enough, found
-        fresh = scene.target_samples(DRAWS.redundant_projectors.later(attempt))
+        fresh = scene.target_samples(DRAWS.surviving_projectors.later(attempt))
         if confirms_losses(candidates, candidates.of(start), fresh):
             return candidates, enough, found
         some = fresh.take(np.arange(0, len(fresh), _JOINING))
@@ -112,11 +139,11 @@ def _places(
     return np.array(sorted(known), dtype=np.int64)
 
 
-def _cover(candidates: CandidateSet) -> RedundantCover:
+def _cover(candidates: CandidateSet) -> SurvivingCover:
     """State the cover of which any one set may be lost."""
     # Floors so high that fresh samples should confirm them.
     quotas, stock = candidates.cover.aims, candidates.stock
-    return RedundantCover.of(
+    return SurvivingCover.of(
         [candidates.lit.astype(np.uint8)],
         [quotas.total],
         row_sets=quotas.regions.row,
@@ -134,8 +161,8 @@ def _solved(
     most: int,
     *,
     kicks: int = KICKS,
-) -> RedundantSolution:
-    return solve_redundant(
+) -> SurvivingSolution:
+    return solve_surviving(
         _cover(candidates),
         lower_bound=least,
         most=most,
@@ -154,7 +181,7 @@ class _Search:
 
     def fewest(
         self, candidates: CandidateSet, start: _Index, bound: int
-    ) -> tuple[CandidateSet, RedundantSolution]:
+    ) -> tuple[CandidateSet, SurvivingSolution]:
         """Return the fewest found, and the candidates that they are of."""
         found = _solved(candidates, start, bound, bound + _MORE)
         while found.status != "infeasible" and len(found.selected) > bound:
@@ -166,7 +193,7 @@ class _Search:
 
     def _one_fewer(
         self, candidates: CandidateSet, chosen: _Index
-    ) -> tuple[CandidateSet, RedundantSolution] | None:
+    ) -> tuple[CandidateSet, SurvivingSolution] | None:
         """Return one fewer from poses around those that lack least, if any do."""
         count, poses, best = len(chosen) - 1, candidates, chosen
         for scale in _SCALES:

@@ -26,8 +26,8 @@ _Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
-class RedundantCover:
-    """Data of a redundant cover.
+class SurvivingCover:
+    """Data of a surviving cover.
 
     Attributes:
         serves: How often each set serves each element in each case, (n_e, n_s) each.
@@ -85,7 +85,7 @@ class RedundantCover:
         n_fixed: int = 0,
         kinds: _Index | None = None,
         stock: _Index | None = None,
-    ) -> "RedundantCover":
+    ) -> "SurvivingCover":
         """Return the cover; what isn't given asks for nothing, the first are fixed."""
         n_e, n_s = serves[0].shape
         rows = np.zeros(n_e, dtype=np.int64) if row_sets is None else row_sets
