@@ -299,6 +299,42 @@ def _requirements(light: str, target: str, surface: Surface) -> dict[str, Any]:
     }
 
 
+def pairs_of(plan: RigPlan) -> tuple[list[dict[str, Any]], Any, Any, Any]:
+    """Return rows of the slow loop with pairs; weights, flags of the target, regions.
+
+    Of each row `pairs` lists the projector and camera that measure it, and `reference`
+    says with how many reference cameras each projector does.
+    """
+    document, surface = plan.to_document(), plan.surface
+    points, faces, weights = _points(surface.mesh)
+    limits, projectors = document["requirements"], document["projectors"]
+    camera, rows = document["cameras"][0], []
+    views = [
+        camera | {"world_from_device": pose}
+        for pose in surface.reference_cameras.tolist()
+    ]
+    for point, face in zip(points, faces.tolist(), strict=True):
+        inside = surface.region[face] >= 0
+        row = _evaluate(document, surface, point, face, inside)
+        p, n = point.tolist(), surface.mesh.face_normals[face].tolist()
+
+        def measured(i: int, one: Any, row: Any = row, p: Any = p, n: Any = n) -> bool:
+            lit = row["lit_by"][i]
+            return lit and pair_steps(projectors[i], one, p, n, limits) == MEASURED
+
+        each = range(len(projectors))
+        row["pairs"] = [
+            (i, c)
+            for i in each
+            for c, one in enumerate(document["cameras"])
+            if measured(i, one)
+        ]
+        row["reference"] = [sum(measured(i, one) for one in views) for i in each]
+        rows.append(row)
+    region = surface.region[faces]
+    return rows, weights, region >= 0, region
+
+
 # The slow loop ------------------------------------------------------------------------
 
 
