@@ -15,7 +15,6 @@ from planning.model.document.device_records import RingAxis
 from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
 from planning.model.progress import TIME_IS_UP, Report, Stopwatch
 from planning.report.assemble import write_plan
-from planning.report.entries.cost_entry import cost_record
 from planning.report.live_bar import shown
 from planning.report.partial_plan import PartialPlan, PlanRequest
 from planning.report.summary.shortfall import shortfalls
@@ -28,6 +27,7 @@ from planning.scene.interest import Select, Weight
 from planning.scene.ranges.ranged_body import RangedBody
 from planning.verify.verification import Verification, verify_plan
 
+from .steps.checked import with_check
 from .steps.prepare import prepared, request_of, standing_devices
 from .steps.stages import (
     as_they_stand,
@@ -311,26 +311,4 @@ def _checked(
         return cut
     if checked is not None:
         checked(plan, verification)
-    check, record = verification.reconstruction, None
-    if check is not None:
-        false = verification.audit.failures
-        record = check.record()
-        record = record.changed(
-            failures=(*false, *record.failures), passed=record.passed and not false
-        )
-    greedy = partial.camera_stage.certificate.greedy_count
-    (member,) = plan.document.members
-    document = plan.document.changed(
-        reconstruction=record,
-        members=(member.changed(reconstruction=record),),
-        timings_s=dict(clock.seconds),
-        cost=cost_record(
-            plan.document.rig,
-            plan.document.projectors,
-            plan.document.cameras,
-            n_before=greedy,
-            stages=clock.processor,
-            scan=None if check is None else check.seconds,
-        ),
-    )
-    return RigPlan(document, plan.surface)
+    return with_check(plan, verification, partial, clock)

@@ -21,8 +21,12 @@ from planning.scene.bodies.clearance import lacks_clearance
 from planning.scene.draws import DRAWS
 from planning.scene.limits.calibration_terms import surface_deviation
 from planning.scene.measurability import expected_noise_px
-from planning.scene.measured import LitSamples, lit_samples, measured_by
-from planning.scene.measuring_pairs import measuring_pairs
+from planning.scene.measured import (
+    LitSamples,
+    lit_samples,
+    measured_by,
+    measuring_pairs,
+)
 from planning.scene.placed_bodies import moves_bodies
 from planning.scene.scene import Scene
 

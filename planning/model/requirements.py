@@ -10,10 +10,9 @@ from math import pi
 from typing import Any, Literal
 
 from .bodies import Box, Existing, Mount, Triple
-from .calibration_errors import PERFECT, CalibrationErrors, Robust
+from .calibration_errors import PERFECT, CalibrationErrors, Robust, Survival
 from .light.drawn_edges import DrawnEdges
 from .light.light_budget import LightBudget
-from .survival import Survival
 
 # Of a workspace: zones and standoffs that aren't given have no key.
 _ZONES = ("box", "keep_out", "mounting")

@@ -36,6 +36,7 @@ from planning.report.advice.what_helps import with_fewer_needed, with_relaxation
 from planning.report.entries.cost_entry import cost_record
 from planning.report.entries.overlaps import overlap_records
 from planning.report.entries.range_entries import ranges_record, with_spread
+from planning.report.entries.survival_entries import survival_record
 from planning.report.entries.violations import violations
 from planning.rings.ring_pitch import widest_gap
 from planning.scene.placed_bodies import Device
@@ -46,7 +47,6 @@ from .entries import device_entries as entries
 from .judged import Devices
 from .marginal import marginal_records
 from .partial_plan import PartialPlan, Prepared
-from .survival_claims import survival_record
 
 
 def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:

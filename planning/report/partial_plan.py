@@ -10,6 +10,7 @@ from planning.model.document.certificates import CamerasBy
 from planning.model.document.device_records import AxisTaken, RingAxis
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.projectors.projector_stage import ProjectorStage
+from planning.proofs.surviving_counts import SurvivingCount
 from planning.rig.mounted import Mounted
 from planning.rig.range_guard import Guard
 from planning.rig.rig import Rig
@@ -19,7 +20,6 @@ from planning.scene.interest import Interest
 from planning.scene.lights import light_of
 from planning.scene.ranges.ranged_body import RangedBody
 from planning.scene.scene import Scene
-from planning.survival.surviving_counts import SurvivingCount
 
 
 @dataclass(frozen=True, eq=False)

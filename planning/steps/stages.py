@@ -14,6 +14,7 @@ from planning.cameras.camera_cover import (
 )
 from planning.cameras.camera_routes import cheapest, widest_routes
 from planning.cameras.camera_stage import CameraSolution, follow_cameras
+from planning.cameras.kept_pairs import rings_for_pairs
 from planning.cameras.proved_cameras import CameraStage, bound_stage
 from planning.model.document.certificates import Certificate
 from planning.model.document.device_records import RingAxis
@@ -34,9 +35,8 @@ from planning.report.advice.what_helps import falls_short
 from planning.report.partial_plan import PartialPlan, Prepared
 from planning.report.region_claims import below_floor
 from planning.rings.acquisition import pixels_read
-from planning.rings.ring_stage import RingStage, Spacing, space_rings
+from planning.rings.ring_stage import space_rings
 from planning.scene.draws import DRAWS
-from planning.survival.kept_pairs import rings_uphold
 
 from .prepare import offered
 
@@ -180,21 +180,14 @@ def _with_rings(
         final = follow_cameras(
             scene, partial.projectors, moved.cameras, stage, request.cameras_by
         )
-    among = scene.among((*final.projectors, *moved.cameras))
-
-    def spaced(spacing: Spacing) -> RingStage:
-        return space_rings(
-            among,
-            final.projectors,
-            moved.cameras,
-            spacing,
-            final.stage.cover.samples,
-            margin=request.ring_margin,
-        )
-
-    rings = spaced(request.rig.rings.spacing)
-    if not rings_uphold(among, final.projectors, rings.projectors, moved.cameras):
-        rings = spaced("uniform")
+    rings = rings_for_pairs(
+        scene.among((*final.projectors, *moved.cameras)),
+        final.projectors,
+        moved.cameras,
+        request.rig.rings.spacing,
+        final.stage.cover.samples,
+        margin=request.ring_margin,
+    )
     return replace(
         partial,
         projectors=final.projectors,

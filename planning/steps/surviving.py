@@ -9,17 +9,17 @@ from dataclasses import replace
 from planning.cameras.axis_choice import place_for_axes
 from planning.cameras.camera_cover import NothingMeasuredError, camera_candidate_views
 from planning.cameras.proved_cameras import bound_stage
+from planning.cameras.surviving_cameras import surviving_cameras
 from planning.model.errors import InputError
 from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
 from planning.projectors.projector_stage import ProjectorStage
+from planning.projectors.surviving_projectors import surviving_projectors
 from planning.proofs import camera_bound, projector_bound
 from planning.proofs.candidate_certificate import counted
+from planning.proofs.surviving_counts import SurvivingCount
+from planning.report.entries.survival_entries import falls_short_after
 from planning.report.partial_plan import PartialPlan, PlanRequest, Prepared
-from planning.report.survival_claims import falls_short_after
-from planning.survival.surviving_cameras import surviving_cameras
-from planning.survival.surviving_counts import SurvivingCount
-from planning.survival.surviving_projectors import surviving_projectors
 
 from .stages import placed
 

@@ -15,6 +15,8 @@ from planning.cli.console import (
     threads_option,
 )
 
+from .survival_options import survival_options
+
 # What `plan --help` puts together; an option of none of these is told last.
 _GROUPS = {
     "What is measured": (
@@ -199,21 +201,7 @@ class GroupedCommand(click.Command):
     help="Tighten the requirements until this share of drawn rigs meets them, mounted "
     "and calibrated as the rig's [mounting] and [calibration] say [default: none].",
 )
-@click.option(
-    "--views",
-    type=click.IntRange(1, 8),
-    metavar="K",
-    help="Count as covered what at least K different pairs of projector and camera "
-    "measure [default: 1].",
-)
-@click.option(
-    "--survive",
-    type=click.IntRange(0, 1),
-    default=0,
-    metavar="N",
-    help="1: when any one projector or camera is lost, the others still meet the "
-    "requirements [default: 0].",
-)
+@survival_options
 @click.option(
     "--cameras-by",
     type=click.Choice(["cover", "paper", "both"]),

@@ -13,6 +13,7 @@ from geometry.poses import horizontal_axes
 from planning.model.document.certificates import Certificate
 from planning.model.plan import RigPlan
 from planning.model.words import count_words, percent
+from planning.report.tolerance.survival_lines import counted_words, losses_words
 
 from .cause_words import causes_line
 from .check_lines import error_words, unchecked
@@ -22,11 +23,6 @@ from .region_lines import worst_region
 from .robust_lines import robust_cost
 from .shortfall import Shortfall, missing
 from .summary import lost_in_field
-from .survival_lines import (
-    proof_words,
-    survival_cost,
-    worst_losses,
-)
 from .warning_lines import warnings
 
 MOST_LINES, COLUMNS = 25, 100
@@ -185,10 +181,8 @@ def _fewest(plan: RigPlan) -> Iterator[_Block]:
         return
     proofs = plan.document.certificates
     kinds = {"projector": proofs.projectors, "camera": proofs.cameras}
-    if (surviving := plan.document.survival) is not None:
-        for label, kind in zip(("FEWEST", ""), kinds, strict=True):
-            if count := getattr(surviving, f"{kind}s"):
-                yield label, proof_words(kind, count), 2
+    if plan.document.survival is not None:
+        yield from zip(("FEWEST", ""), counted_words(plan), (2, 2), strict=True)
         return
     if all(_over_all(proof) for proof in kinds.values()):
         counts = [count_words(proof.count, kind) for kind, proof in kinds.items()]
@@ -205,11 +199,8 @@ def _fewest(plan: RigPlan) -> Iterator[_Block]:
 
 def _surviving(plan: RigPlan) -> Iterator[_Block]:
     """Say what any one loss leaves, and what it costs to stand it."""
-    record, asked = plan.document.survival, plan.requirements.survival
-    if record is None or asked is None:
-        return
-    parts = (worst_losses(plan), survival_cost(record, asked))
-    yield "LOSSES" if asked.survive else "VIEWS", "; ".join(filter(None, parts)), 2
+    if losses := losses_words(plan):
+        yield *losses, 2
 
 
 def _robust(plan: RigPlan) -> Iterator[_Block]:

@@ -4,9 +4,8 @@ from planning.model.document.certificates import Certificate
 from planning.model.document.input_records import SelectionRecord
 from planning.model.plan import RigPlan
 from planning.model.words import count_words, percent
+from planning.report.tolerance.survival_lines import surviving_proofs
 from planning.scene.lights import light_of
-
-from .survival_lines import surviving_proofs
 
 _EXCLUDED = {
     "projector_beam": "lie outside the beam",

@@ -9,7 +9,12 @@ from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
 from planning.model.requirements import Requirements
 from planning.model.words import area_words, percent
-from planning.report.survival_claims import falls_short_after
+from planning.report.entries.survival_entries import falls_short_after
+from planning.report.tolerance.survival_lines import (
+    lit_share,
+    measured_share,
+    pairs_words,
+)
 from planning.scene.limits.limit import causes
 from planning.scene.limits.pair_limits import MEASURED_LIMITS
 from planning.scene.limits.projector_limits import PROJECTOR_LIMITS
@@ -17,7 +22,6 @@ from planning.scene.limits.projector_limits import PROJECTOR_LIMITS
 from .cause_words import areas_line, causes_line, rounded_down
 from .device_lines import used_up
 from .region_lines import floor_shortfalls
-from .survival_lines import lit_share, measured_share, pairs_words
 
 # What accepts the one requirement that a plan misses.
 _ACCEPTS = " accepts this plan"

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from geometry.arrays import Ints, Mask
+from planning.model.calibration_errors import Survival
 from planning.model.document.survival_records import (
     LossRecord,
     SurvivalRecord,
     SurvivingCountRecord,
 )
 from planning.model.plan import RigPlan
-from planning.model.survival import Survival
 from planning.verify.audit.audit_case import AuditCase, DeviceKind
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.estimates import POINT, ROUNDING, share_error

@@ -2,15 +2,15 @@
 
 from collections.abc import Iterator
 
+from planning.model.calibration_errors import Survival
 from planning.model.document.survival_records import (
     LossRecord,
     SurvivalRecord,
     SurvivingCountRecord,
 )
 from planning.model.plan import RigPlan
-from planning.model.survival import Survival
 from planning.model.words import count_words, labelled, percent
-from planning.report.survival_claims import falls_short_after
+from planning.report.entries.survival_entries import falls_short_after
 
 
 def survival_lines(plan: RigPlan) -> list[str]:
@@ -47,6 +47,23 @@ def surviving_proofs(plan: RigPlan) -> list[str]:
         for kind, count in _counts(record)
         if kind == "camera" or asked.survive
     ]
+
+
+def counted_words(plan: RigPlan) -> list[str]:
+    """Return what was proved of the number of each kind of device."""
+    record = plan.document.survival
+    counts = _counts(record) if record is not None else ()
+    return [proof_words(kind, count) for kind, count in counts]
+
+
+def losses_words(plan: RigPlan) -> tuple[str, str] | None:
+    """Return a label, and what a loss leaves at worst and costs to stand."""
+    record, asked = plan.document.survival, plan.requirements.survival
+    if record is None or asked is None:
+        return None
+    parts = (worst_losses(plan), survival_cost(record, asked))
+    label = "LOSSES" if asked.survive else "VIEWS"
+    return label, "; ".join(filter(None, parts))
 
 
 def proof_words(kind: str, count: SurvivingCountRecord) -> str:

@@ -9,17 +9,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.calibration_errors import Survival
 from planning.model.document.survival_records import (
     LossRecord,
     SurvivalRecord,
     SurvivingCountRecord,
 )
 from planning.model.requirements import Requirements
-from planning.model.survival import Survival
+from planning.proofs.surviving_counts import SurvivingCount
+from planning.report.claims import Claims
+from planning.report.judged import Devices
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.measured import LitSamples
-from planning.scene.measuring_pairs import (
+from planning.scene.measured import (
+    LitSamples,
     measured_fold,
     measuring_pairs,
     reachable_fold,
@@ -27,10 +30,6 @@ from planning.scene.measuring_pairs import (
     without_projector,
 )
 from planning.scene.scene import Scene
-from planning.survival.surviving_counts import SurvivingCount
-
-from .claims import Claims
-from .judged import Devices
 
 _Mask = NDArray[np.bool_]
 # Equal up to rounding is enough.

@@ -1,19 +1,44 @@
-"""Whether rings that were spaced anew leave what pairs must measure after a loss."""
+"""Rings for cameras that leave what pairs must measure after a loss."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.losses import PairDemand
 from planning.proofs.quotas import RegionFloors
+from planning.rings.ring_stage import RingStage, Spacing, space_rings
 from planning.scene.draws import DRAWS
-from planning.scene.measured import lit_samples
-from planning.scene.measuring_pairs import measuring_pairs
+from planning.scene.measured import LitSamples, lit_samples, measuring_pairs
 from planning.scene.scene import Scene
 
 # Of what pairs must measure after a loss, kept to spare for fresh samples.
 _MORE = 1.01
+
+
+def rings_for_pairs(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    cameras: Sequence[PlannedCamera],
+    spacing: Spacing,
+    proved: LitSamples,
+    *,
+    margin: float,
+) -> RingStage:
+    """Return the projectors with the rings of `space_rings`, or else even ones.
+
+    These where finer gaps would lose pairs that a loss may leave alone.
+    """
+    stage = space_rings(scene, projectors, cameras, spacing, proved, margin=margin)
+    if rings_uphold(scene, projectors, stage.projectors, cameras):
+        return stage
+    even = space_rings(scene, projectors, cameras, "uniform", proved, margin=margin)
+    records = tuple(
+        record if record.spacing == "kept" else record.changed(kept_even=True)
+        for record in even.records
+    )
+    return replace(even, records=records)
 
 
 def rings_uphold(

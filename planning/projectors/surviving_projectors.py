@@ -13,6 +13,7 @@ from planning.projectors.proved_projectors import prove_fewest
 from planning.proofs.all_poses import Effort
 from planning.proofs.candidate_certificate import counted
 from planning.proofs.selection import select_fewest
+from planning.proofs.surviving_counts import SurvivingCount, larger_selections
 from planning.scene.draws import DRAWS
 from planning.scene.scene import Scene
 from solvers.surviving.fewest_surviving import (
@@ -21,8 +22,6 @@ from solvers.surviving.fewest_surviving import (
     solve_surviving,
 )
 from solvers.surviving.surviving_cover import SurvivingCover
-
-from .surviving_counts import SurvivingCount, larger_selections
 
 _Index = NDArray[np.int64]
 

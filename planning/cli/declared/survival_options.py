@@ -1,0 +1,28 @@
+"""`--views` and `--survive`: what is measured several times, and what may be lost."""
+
+from collections.abc import Callable
+from typing import Any
+
+import click
+
+_Command = Callable[..., Any]
+
+
+def survival_options(command: _Command) -> _Command:
+    """Declare how many views count, and how many devices may be lost."""
+    views = click.option(
+        "--views",
+        type=click.IntRange(1, 8),
+        metavar="K",
+        help="Count as covered what at least K different pairs of projector and camera "
+        "measure [default: 1].",
+    )
+    survive = click.option(
+        "--survive",
+        type=click.IntRange(0, 1),
+        default=0,
+        metavar="N",
+        help="1: when any one projector or camera is lost, the others still meet the "
+        "requirements [default: 0].",
+    )
+    return views(survive(command))
