@@ -28,7 +28,7 @@ class CameraSolution:
 
     projectors: tuple[PlannedProjector, ...]
     stage: CameraStage
-    axes: AxisTaken = "free"
+    axes: AxisTaken | None = "free"
 
 
 def place_cameras(
@@ -36,7 +36,7 @@ def place_cameras(
     projectors: tuple[PlannedProjector, ...],
     candidates: CandidateViews,
     by: CamerasBy = "both",
-    axes: AxisTaken = "free",
+    axes: AxisTaken | None = "free",
 ) -> CameraSolution:
     """Choose cameras, move free ring axes for them, and see which route is better."""
     cover = cover_axes(scene, projectors, candidates, by, axes)
@@ -49,7 +49,7 @@ class AxesCover:
 
     projectors: tuple[PlannedProjector, ...]
     cover: CameraCover
-    axes: AxisTaken
+    axes: AxisTaken | None
 
 
 def cover_axes(
@@ -57,7 +57,7 @@ def cover_axes(
     projectors: tuple[PlannedProjector, ...],
     candidates: CandidateViews,
     by: CamerasBy,
-    axes: AxisTaken,
+    axes: AxisTaken | None,
 ) -> AxesCover:
     """Choose cameras, and move free ring axes for them."""
     cover = cover_for(scene, projectors, candidates, by)

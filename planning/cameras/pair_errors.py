@@ -153,7 +153,8 @@ def _errors(
     """Projector, s_N, then errors by the projector's and the camera's, (k, 19)."""
     errors, view = limits.calibration or PERFECT, pair.quality.view.take(some)
     rows, seen = pair.samples[some], samples.target.samples
-    surfaces, points = samples.surfaces[pair.projector].take(rows), seen.points[rows]
+    coded, points = samples.surfaces[pair.projector].take(rows), seen.points[rows]
+    surfaces = coded.towards(view.rays)
     r, m, t = view.rays, surfaces.normals, view.distances[:, None]
     along = np.einsum("ij,ij->i", r, m)[:, None]
     facing = view.facing[:, None]

@@ -17,6 +17,7 @@ from planning.model.calibration_errors import (
     Mounting,
 )
 from planning.model.document.device_records import RingAxis
+from planning.model.light.dense_code import DenseCode
 from planning.model.light.photometry_table import PhotometryTable
 from planning.model.light.response_table import Response
 from planning.model.table_types import (
@@ -169,6 +170,28 @@ class RingsTable(Table):
     margin_mm: Annotated[float, Field(ge=0.0)] = 15.0
 
 
+class DenseTable(Table):
+    """What tells every pixel of a projector, `[dense]`; see `DenseCode`."""
+
+    shifts: Annotated[int, Field(ge=0, le=64)] = 4
+    period_px: Annotated[int, Field(ge=4, le=1024)] = 16
+    phase_noise_deg: Annotated[float, Field(gt=0.0, le=90.0)] = 1.0
+
+    @model_validator(mode="after")
+    def _check_code(self) -> Self:
+        self.code()
+        return self
+
+    def code(self) -> DenseCode:
+        """Return the code.
+
+        Raises:
+            ValueError: If there can't be one of these numbers.
+        """
+        noise = math.radians(self.phase_noise_deg)
+        return DenseCode(self.shifts, self.period_px, noise)
+
+
 class LimitsTable(Table):
     """When a point counts as lit, seen and measurable, `[limits]`."""
 
@@ -275,6 +298,7 @@ class RigTable(Table):
     parallel_projector: ParallelTable | None = None
     placement: PlacementTable = PlacementTable()
     rings: RingsTable = RingsTable()
+    dense: DenseTable = DenseTable()
     workspace: WorkspaceTable = WorkspaceTable()
     limits: LimitsTable = LimitsTable()
     calibration: CalibrationTable = CalibrationTable()

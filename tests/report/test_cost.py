@@ -82,7 +82,7 @@ def test_frames_are_those_that_the_patterns_have(n_rings, n_cameras):
     one = projector(n_rings)
     drawn = DrawnRings(LIGHTS["diverging"], one.ring_radii)
     ids = [f"C{c}" for c in range(n_cameras)]
-    assert n_frames([n_rings] * 2, n_cameras) == 2 * len(drawn.frames(ids))
+    assert n_frames([one] * 2, n_cameras) == 2 * len(drawn.frames(ids))
 
 
 @pytest.mark.parametrize(

@@ -130,7 +130,8 @@ class GroupedCommand(click.Command):
     "--pattern",
     type=click.Choice(["rings", "dense", "none"]),
     default="rings",
-    help="What is projected.",
+    show_default=True,
+    help="Rings, or a code of every pixel (see [dense] of the rig file).",
 )
 @click.option(
     "--ring-axis",
@@ -261,10 +262,10 @@ def check_options(options: dict[str, Any]) -> None:
     if options["unit"] and options["size_mm"] is not None:
         raise click.UsageError("give --unit or --size-mm, not both")
     _check_target(options)
+    if options["pattern"] == "none":
+        raise click.UsageError("--pattern none isn't built yet: use rings or dense")
     if options["pattern"] != "rings":
-        raise click.UsageError(
-            f"--pattern {options['pattern']} isn't built yet: use rings"
-        )
+        _check_without_rings(options)
 
 
 def _check_source(options: dict[str, Any]) -> None:
@@ -280,6 +281,19 @@ def _check_source(options: dict[str, Any]) -> None:
     if len(meshes) > 1 or os.path.isdir(meshes[0]):
         raise click.UsageError(
             "several meshes on one rig aren't built yet: give one file"
+        )
+
+
+def _check_without_rings(options: dict[str, Any]) -> None:
+    """Refuse what is said of rings where there are none, and what isn't built."""
+    pattern = options["pattern"]
+    if options["ring_axis"] is not None:
+        raise click.UsageError(
+            f"--ring-axis is of rings, and --pattern {pattern} has none: leave it out"
+        )
+    if options["robust"] is not None:
+        raise click.UsageError(
+            f"--robust isn't built for --pattern {pattern}: rigs are drawn for rings"
         )
 
 

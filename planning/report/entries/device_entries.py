@@ -88,18 +88,32 @@ def projector_records(
         ).changed(
             **_mounted(scene.requirements.workspace.projector_mount, projector),
             rings=None if rings is None else rings.records[p],
-            ring_shares=ring_shares(scene, projector, devices.cameras),
+            **_shares(scene, projector, devices),
             **exposed[p],
         )
         for p, projector in enumerate(devices.projectors)
     )
 
 
+def _shares(
+    scene: Scene, projector: PlannedProjector, devices: Devices
+) -> dict[str, Any]:
+    """What becomes of its rings; no key where it has none."""
+    if projector.code is not None:
+        return {}
+    return {"ring_shares": ring_shares(scene, projector, devices.cameras)}
+
+
 def axes_record(
     scene: Scene, partial: PartialPlan, devices: Devices, claims: Claims
-) -> RingAxes:
-    """Return `ring_axes`: what was asked and taken, and what others would measure."""
+) -> RingAxes | None:
+    """Return `ring_axes`: what was asked and taken, and what others would measure.
+
+    None where the pattern has none.
+    """
     request, other = partial.request, None
+    if partial.axes is None:
+        return None
     if partial.other_axes:
         pairs = zip(partial.other_axes, devices.projectors, strict=True)
         turned = [rounded_projector(p, planned.id) for p, planned in pairs]

@@ -86,7 +86,7 @@ def _rings(plan: RigPlan) -> str:
             [
                 record.id,
                 str(len(record.ring_radii)),
-                str(n_frames((len(record.ring_radii),), len(plan.cameras))),
+                str(n_frames((record.planned(),), len(plan.cameras))),
                 "" if gap is None else f"{1e3 * gap[0]:.1f} to {1e3 * gap[1]:.1f}",
                 *(percent(float(np.mean(values))) for values in by_ring),
                 *("" for _ in range(2 - len(by_ring))),

@@ -114,7 +114,7 @@ def _sequence(plan: RigPlan) -> list[dict[str, Any]]:
     schedule = plan.document.firing_schedule
     groups = schedule.groups if schedule else tuple((p.id,) for p in plan.projectors)
     frames = {
-        p.id: n_frames((len(p.ring_radii),), len(plan.cameras)) for p in plan.projectors
+        p.id: n_frames((p,), len(plan.cameras)) for p in plan.projectors
     }
     return [
         {"on": list(group), "frames": [frames[name] for name in group]}

@@ -27,15 +27,15 @@ from .limit import (
     to_step,
 )
 
-# Of the edge's noise, as stated and by the light, of misplaced rings and of the panel's
-# pixels, s_N; of the calibration, s_C.
-Term = Literal["edges", "light", "rings", "linearity", "camera", "projector"]
+# Of noise in the image, as stated and by the light, of misplaced rings, of the phase and
+# of the panel's pixels, s_N; of the calibration, s_C.
+Term = Literal["edges", "light", "phase", "rings", "linearity", "camera", "projector"]
 TERMS: tuple[Term, ...] = get_args(Term)
-NOISE_TERMS: tuple[Term, ...] = ("edges", "light", "rings", "linearity")
+NOISE_TERMS: tuple[Term, ...] = ("edges", "light", "phase", "rings", "linearity")
 
 # Beyond these no limit is worth relaxing: first-order errors hold no longer.
 _LEAST_CONDITIONING = 0.03
-_LEAST_PITCH_PX = 3.0
+_LEAST_PITCH_PX, _LEAST_ANGLE = 3.0, 3.0
 # More or less light by more than this is another rig.
 _MOST_LIGHT = 30.0
 
@@ -55,6 +55,8 @@ class PairQuality:
         edge_px: Noise of edges in the image [px], shape (n,).
         drawn_m: How far rings and their edges lie off along m, rms [m], shape (n,).
         grey: How bright they come out; None: nobody says.
+        light_cos: Cosine of the angle at which ray and light meet, shape (n,); None: of
+            rings, which it says little of.
     """
 
     conditioning: Array
@@ -66,6 +68,7 @@ class PairQuality:
     edge_px: Array
     drawn_m: Array
     grey: GreyLevels | None = None
+    light_cos: Array | None = None
 
     @property
     def total(self) -> Array:
@@ -78,7 +81,8 @@ class PairCell:
     """The best of one projector with a camera anywhere in a cell of poses, (k,) each.
 
     |r.m| and |N.r| at most, t |g| at least; s_px in [px], h in [m], and at least what
-    moves the surfaces of equal code, times |N.r| [m].
+    moves the surfaces of equal code, times |N.r| [m]. Of coded pixels also the least
+    and the largest angle at which ray and light may meet.
     """
 
     conditioning: Array
@@ -87,6 +91,7 @@ class PairCell:
     noise: Array
     spacing: Array
     placement: Array
+    angles: tuple[Array, Array] | None = None
 
 
 class TooDark(Limit[PairQuality, PairCell, TriangulationLimits]):
@@ -183,6 +188,55 @@ class Conditioning(Limit[PairQuality, PairCell, TriangulationLimits]):
         )
 
 
+class Angle(Limit[PairQuality, PairCell, TriangulationLimits]):
+    """Ray and light meet at min_angle to max_angle, of coded pixels."""
+
+    name = "angle"
+    words = "where ray and light meet at too small or too large an angle"
+
+    def holds(self, view: PairQuality, rules: TriangulationLimits) -> Mask | None:
+        """Return which samples lie between both."""
+        if view.light_cos is None:
+            return None
+        low, high = rules.angles
+        return (view.light_cos <= np.cos(low)) & (view.light_cos >= np.cos(high))
+
+    def may_hold(self, cell: PairCell, rules: TriangulationLimits) -> Mask | None:
+        """Return which may, of all angles that a cell leaves."""
+        if cell.angles is None:
+            return None
+        (least, largest), (low, high) = cell.angles, rules.angles
+        return (largest >= low - ROUNDING) & (least <= high + ROUNDING)
+
+    def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:
+        """Yield a smaller least angle, and a larger largest one."""
+        low, high = facts.required.triangulation.angles
+
+        def met(pair: PairQuality) -> Array:
+            return np.degrees(np.arccos(np.clip(pair.light_cos, -1.0, 1.0)))
+
+        yield LimitRelaxation(
+            self.name,
+            lambda pair: np.where(
+                (met(pair) >= _LEAST_ANGLE) & (met(pair) < np.degrees(low)),
+                -met(pair),
+                np.inf,
+            ),
+            to_step(1.0),
+            lambda value: (
+                f"limits.min_angle_deg = {-value:.0f} (now {np.degrees(low):g})"
+            ),
+        )
+        yield LimitRelaxation(
+            self.name,
+            lambda pair: np.where(met(pair) > np.degrees(high), met(pair), np.inf),
+            to_step(1.0),
+            lambda value: (
+                f"limits.max_angle_deg = {value:.0f} (now {np.degrees(high):g})"
+            ),
+        )
+
+
 class Sigma(Limit[PairQuality, PairCell, TriangulationLimits]):
     """s_N, or with the calibration's s_C sqrt(s_N^2 + s_C^2), <= max_sigma."""
 
@@ -259,6 +313,7 @@ PAIR_LIMITS: tuple[Limit[Any, Any, Any], ...] = (
     TooDark(),
     Clipped(),
     Conditioning(),
+    Angle(),
     Sigma(),
     Pitch(),
 )
