@@ -199,7 +199,8 @@ def _final_requirements(scene: Scene, claims: Claims, devices: Devices) -> Requi
     nearest = (
         widest_gap(scene, devices.projectors, claims.target_samples)
         if requirements.pattern == "rings"
-        else _TAU_PIXELS * widest_pixel(scene, devices.projectors, claims.target_samples)
+        else _TAU_PIXELS
+        * widest_pixel(scene, devices.projectors, claims.target_samples)
     )
     check = replace(requirements.check, tau_m=round(nearest, 6))
     return replace(requirements, workspace=workspace, check=check)

@@ -113,9 +113,7 @@ def _sequence(plan: RigPlan) -> list[dict[str, Any]]:
     """Which projectors shine in each step, and in how many frames."""
     schedule = plan.document.firing_schedule
     groups = schedule.groups if schedule else tuple((p.id,) for p in plan.projectors)
-    frames = {
-        p.id: n_frames((p,), len(plan.cameras)) for p in plan.projectors
-    }
+    frames = {p.id: n_frames((p,), len(plan.cameras)) for p in plan.projectors}
     return [
         {"on": list(group), "frames": [frames[name] for name in group]}
         for group in groups

@@ -79,7 +79,9 @@ def _rings_words(
     plan: RigPlan, projectors: Sequence[ProjectorRecord | OtherRings]
 ) -> str:
     counts = [len(projector.ring_radii) for projector in projectors]
-    return f"{sum(counts)} rings in {n_frames(plan.projectors, len(plan.cameras))} frames"
+    return (
+        f"{sum(counts)} rings in {n_frames(plan.projectors, len(plan.cameras))} frames"
+    )
 
 
 def _notes(record: ProjectorRecord, tolerance_m: float) -> list[str]:
