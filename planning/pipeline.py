@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 from geometry.mesh.mesh import TriangleMesh
 from geometry.parallel import n_threads
 from planning.model.document.certificates import CamerasBy
-from planning.model.document.device_records import RingAxis
+from planning.model.document.ring_records import RingAxis
 from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
 from planning.model.progress import TIME_IS_UP, Report, Stopwatch
 from planning.report.assemble import write_plan

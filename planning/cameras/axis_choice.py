@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from planning.model.document.certificates import CamerasBy
-from planning.model.document.device_records import AxisTaken, RingAxis
+from planning.model.document.ring_records import AxisTaken, RingAxis
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.rings.acquisition import pixels_read
 from planning.rings.axis_moves import move_ring_axes

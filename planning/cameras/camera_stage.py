@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planning.model.document.certificates import CamerasBy, Certificate
-from planning.model.document.device_records import AxisTaken
+from planning.model.document.ring_records import AxisTaken
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.selection import Selection
 from planning.rings.axis_moves import move_ring_axes

@@ -21,7 +21,7 @@ from planning.model.calibration_errors import PERFECT
 from planning.model.planned import PlannedProjector
 from planning.model.requirements import TriangulationLimits
 from planning.scene.camera_views import CameraView
-from planning.scene.limits.pair_limits import NOISE_TERMS
+from planning.scene.limits.pair_quality import NOISE_TERMS
 from planning.scene.measured import LitSamples, Pair, pairs_of
 
 _Array = NDArray[np.float64]

@@ -48,7 +48,6 @@ from .judged import Devices
 from .marginal import marginal_records
 from .partial_plan import PartialPlan, Prepared
 
-
 # A point must be found within a ring gap, or so many pixels of the panel: at steps and
 # borders a decoder leaves some out.
 _TAU_PIXELS = 4.0

@@ -7,7 +7,7 @@ from geometry.parallel import n_threads
 from geometry.regions.regions import DominantRegions
 from planning.cameras.proved_cameras import CameraStage
 from planning.model.document.certificates import CamerasBy
-from planning.model.document.device_records import AxisTaken, RingAxis
+from planning.model.document.ring_records import AxisTaken, RingAxis
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.projectors.projector_stage import ProjectorStage
 from planning.rig.mounted import Mounted

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from geometry.mesh.extent import enclosing_ball
 from geometry.poses import inverse, transform
 from planning.model.planned import PlannedProjector
+from planning.scene.codes.patterns import RingPattern
 from planning.scene.draws import DRAWS
 from planning.scene.lights import Light, light_of
 from planning.scene.measured import lit_samples
-from planning.scene.patterns import RingPattern
 from planning.scene.samples import merged
 from planning.scene.scene import Scene
 

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.topology import face_pairs
 from planning.model.planned import PlannedProjector
+from planning.scene.codes.patterns import RingPattern
 from planning.scene.lighting import first_failure, light_on
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.patterns import RingPattern
 from planning.scene.scene import Scene
 
 from .beam_profile import on_faces

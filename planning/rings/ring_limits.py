@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.planned import PlannedProjector
+from planning.scene.codes.patterns import RingPattern
 from planning.scene.lights import light_of
-from planning.scene.patterns import RingPattern
 from planning.scene.scene import Scene
 
 from .beam_profile import BeamProfile, cast_beam

@@ -10,8 +10,8 @@ equal code, J_r = dr/d(u, v), v = r x (N x m) and g = J_r^T v::
 
 with s_px = s_0 / (-N.L), and the noise of the light beside it where the rig states that
 (`light_terms`), h the spacing along m, and s_L what blur leaves of the panel's pixels
-(`edge_terms`). Of coded pixels m follows from r (`code_surfaces`), and beside s_R stands
-the noise of the phase (`code_noise`). s_v and s_m are what errors of the
+(`edge_terms`). Of coded pixels m follows from r (`codes.surfaces`), and beside s_R
+stands the noise of the phase (`code_noise`). s_v and s_m are what errors of the
 calibration move the viewing ray by along v, and the surface of equal code along m
 (`calibration_terms`). `formulation.md`, sections 3 and 8.
 """
@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from geometry.rays.visibility import Visibility
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import CameraLimits, TriangulationLimits
-from planning.scene.code_surfaces import Coded, CodedPixels, PixelSurfaces
+from planning.scene.codes.surfaces import Coded, CodedPixels, PixelSurfaces
 from planning.scene.limits.calibration_terms import ray_deviation, surface_deviation
 from planning.scene.limits.camera_limits import (
     BLOCKED,
@@ -38,7 +38,8 @@ from planning.scene.limits.camera_limits import (
 )
 from planning.scene.limits.code_noise import code_noise, least_phase_px, together
 from planning.scene.limits.limit import first_violated
-from planning.scene.limits.pair_limits import PAIR_LIMITS, PairQuality, Term
+from planning.scene.limits.pair_limits import PAIR_LIMITS
+from planning.scene.limits.pair_quality import PairQuality, Term
 
 from .placed_bodies import Blocker, first_blocked
 from .samples import LightOnSamples, Target

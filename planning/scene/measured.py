@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 from geometry.arrays import rows_of
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import TriangulationLimits
+from planning.scene.codes.patterns import panel_light, pattern_of
+from planning.scene.codes.surfaces import Coded
 from planning.scene.limits.camera_limits import ViewedSamples
-from planning.scene.limits.pair_limits import MEASURED, PairQuality
+from planning.scene.limits.pair_limits import MEASURED
+from planning.scene.limits.pair_quality import PairQuality
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.code_surfaces import Coded
-from planning.scene.patterns import panel_light, pattern_of
 
 from .camera_views import CameraView, camera_views, view_of
 from .lighting import light_on, lit_stages

@@ -16,7 +16,7 @@ from planning.cameras.camera_routes import Widened, cheapest, widest_routes
 from planning.cameras.camera_stage import CameraSolution, follow_cameras
 from planning.cameras.proved_cameras import CameraStage, bound_stage
 from planning.model.document.certificates import Certificate
-from planning.model.document.device_records import AxisTaken, RingAxis
+from planning.model.document.ring_records import AxisTaken, RingAxis
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch

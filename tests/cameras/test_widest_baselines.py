@@ -23,10 +23,10 @@ from planning.cameras.baselines.widest_baselines import BaselineSearch
 from planning.model.bodies import Box
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import TriangulationLimits
+from planning.scene.codes.surfaces import CodeSurfaces
 from planning.scene.limits.camera_limits import ViewedSamples
 from planning.scene.limits.pair_limits import MEASURED
 from planning.scene.measurability import first_pair_failure, pair_quality
-from planning.scene.code_surfaces import CodeSurfaces
 
 THETA = np.radians(60.0)
 RADIUS, RING = 0.1, 1.0

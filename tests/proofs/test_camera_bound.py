@@ -32,11 +32,11 @@ from planning.proofs.cells import measurable_cells
 from planning.proofs.cells.image_cone import image_cone
 from planning.proofs.cells.measurable_cells import MeasurableCells
 from planning.rig.rig import load_rig
+from planning.scene.codes.surfaces import CodeSurfaces
 from planning.scene.draws import Draw
 from planning.scene.lights import ring_frame
 from planning.scene.limits import pair_limits
 from planning.scene.measured import LitSamples, lit_samples
-from planning.scene.code_surfaces import CodeSurfaces
 from planning.scene.samples import LightOnSamples
 from planning.scene.workspace.candidates import aimed_poses
 from solvers.cells.cell_bound import CellStatus

@@ -5,13 +5,12 @@ import pytest
 
 from geometry.devices import PinholeModel
 from planning.model.document.device_records import (
-    CreasesRecord,
     ProjectorRecord,
-    RingsRecord,
     camera_record,
     projector_record,
 )
 from planning.model.document.input_records import RigRecord
+from planning.model.document.ring_records import CreasesRecord, RingsRecord
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.report.entries.cost_entry import cost_record
 from planning.report.summary.check_lines import cost_lines

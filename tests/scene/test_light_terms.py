@@ -14,6 +14,7 @@ from geometry.poses import look_at
 from planning.model.light.light_budget import SATURATED, LightBudget
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.scene import measurability
+from planning.scene.codes.patterns import panel_light
 from planning.scene.limits.light_terms import (
     edge_noise_px,
     electrons,
@@ -21,7 +22,6 @@ from planning.scene.limits.light_terms import (
 )
 from planning.scene.limits.limit import RigFacts
 from planning.scene.limits.pair_limits import CAUSES, Clipped, TooDark
-from planning.scene.patterns import panel_light
 from planning.verify.audit.predicates.audit_devices import AuditCamera, AuditProjector
 from planning.verify.audit.predicates.light_levels import LightLevels
 

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.requirements import TriangulationLimits
-from planning.scene.code_surfaces import CodedPixels, CodeSurfaces
+from planning.scene.codes.surfaces import CodedPixels, CodeSurfaces
 from planning.scene.limits.calibration_terms import surface_deviation
 from planning.scene.limits.code_noise import least_phase_px
-from planning.scene.limits.pair_limits import PairCell
+from planning.scene.limits.pair_quality import PairCell
 
 _Array = NDArray[np.float64]
 _Index = NDArray[np.int64]
@@ -27,7 +27,7 @@ _Index = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Cone:
-    """Unit directions u from k samples, (k, 3), and what is within psi of them, (k,)."""
+    """Unit directions u from k samples, (k, 3), and what is within psi, (k,)."""
 
     towards: _Array
     psi: _Array

@@ -14,8 +14,8 @@ image's bounds on |g| / |v| and on z / t (`image_cone`)::
     z       >= (t_c - e) cos(off axis),  z / (f |N.r|)      must not exceed the limit
 
 Of coded pixels m turns with r (`crossings`). A sample stays if that holds for some
-projector that lights it, and some model of the cameras. Bodies of devices are left out. The symbols and limits are those of
-`measurability`.
+projector that lights it, and some model of the cameras. Bodies of devices are left out.
+The symbols and limits are those of `measurability`.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
 from planning.model.requirements import Requirements
-from planning.scene.code_surfaces import CodedPixels
+from planning.scene.codes.surfaces import CodedPixels
 from planning.scene.limits.camera_limits import CAMERA_LIMITS, CellView
 from planning.scene.limits.limit import may_hold
 from planning.scene.limits.pair_limits import PAIR_LIMITS

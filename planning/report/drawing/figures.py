@@ -13,7 +13,7 @@ from geometry.shapes.boxes import OrientedBox
 from planning.model.bodies import Box
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedProjector
-from planning.scene.patterns import pattern_of
+from planning.scene.codes.patterns import pattern_of
 from planning.scene.placed_bodies import Device, placed_box
 
 from .picture_view import Colour, facing

@@ -17,10 +17,7 @@ from planning.model.device_poses import DECIMALS, rounded_pose
 from planning.model.document.coverage_records import RegionRecord
 from planning.model.document.device_records import (
     CameraRecord,
-    OtherAxes,
-    OtherRings,
     ProjectorRecord,
-    RingAxes,
     camera_record,
     projector_record,
 )
@@ -29,6 +26,7 @@ from planning.model.document.input_records import (
     SelectionRecord,
 )
 from planning.model.document.part import Vector3
+from planning.model.document.ring_records import OtherAxes, OtherRings, RingAxes
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.report.claims import Claims
 from planning.report.judged import Devices

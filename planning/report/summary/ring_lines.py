@@ -4,13 +4,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planning.model.document.device_records import (
+from planning.model.document.device_records import ProjectorRecord
+from planning.model.document.plan_document import PlanDocument
+from planning.model.document.ring_records import (
     OtherRings,
-    ProjectorRecord,
     RingSharesRecord,
     RingsRecord,
 )
-from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
 from planning.model.words import labelled, percent
 from planning.rings.acquisition import n_frames

@@ -21,7 +21,7 @@ from planning.model.light.dense_code import DenseCode
 from planning.model.light.drawn_edges import DrawnEdges
 from planning.model.light.light_budget import LightBudget
 from planning.model.requirements import TriangulationLimits
-from planning.scene.code_surfaces import CodeSurfaces, PixelSurfaces
+from planning.scene.codes.surfaces import CodeSurfaces, PixelSurfaces
 from planning.scene.samples import LightOnSamples
 
 from .camera_limits import ViewedSamples
@@ -34,7 +34,7 @@ from .light_terms import (
     phase_noise,
 )
 from .limit import Array
-from .pair_limits import Term
+from .pair_quality import Term
 
 # Standard deviation of what is told to a pixel [px].
 _TO_A_PIXEL = float(np.sqrt(1.0 / 12.0))

@@ -10,8 +10,8 @@ import numpy as np
 from geometry.devices import DeviceModel
 from planning.model.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
+from planning.scene.codes.patterns import pattern_of
 from planning.scene.lights import light_of
-from planning.scene.patterns import pattern_of
 from planning.scene.samples import SampleColumns
 
 from .limit import (

@@ -22,8 +22,7 @@ from geometry.mesh.tensors import lengths
 from geometry.poses import inverse, transform
 from planning.model.light.dense_code import DenseCode
 from planning.model.planned import PlannedProjector
-
-from .samples import SampleArrays
+from planning.scene.samples import SampleArrays
 
 _Array = NDArray[np.float64]
 

@@ -12,9 +12,9 @@ from geometry.mesh.tensors import lengths
 from geometry.poses import inverse, transform
 from planning.model.light.dense_code import DenseCode
 from planning.model.planned import PlannedProjector
+from planning.scene.lights import light_of
 
-from .code_surfaces import Coded, CodedPixels, CodeSurfaces, PanelLight, PanelRays
-from .lights import light_of
+from .surfaces import Coded, CodedPixels, CodeSurfaces, PanelLight, PanelRays
 
 # Wider than any ring that is drawn, as a tangent or in [m].
 _WIDEST = 1e3
