@@ -30,10 +30,13 @@ class ProjectorLimits:
     Attributes:
         max_incidence: theta_max; -N.L >= cos(max_incidence) [rad].
         min_tangent_angle: tau_min; angle between L and the line of T1 [rad].
+        max_sample_distance_m: Largest p(z) / (-N.L), what a pixel of the panel covers
+            of the surface [m]; of a dense code only.
     """
 
     max_incidence: float
     min_tangent_angle: float
+    max_sample_distance_m: float | None = None
 
 
 @dataclass(frozen=True)
@@ -309,6 +312,7 @@ class Requirements:
             (document["workspace"], _LEFT_OUT),
             (document, ("existing", "robust", "stock")),
             (document["triangulation"], ("light",)),
+            (document["projector"], ("max_sample_distance_m",)),
         ]
         for table, names in devices + tables:
             for name in names:

@@ -75,6 +75,7 @@ def build_requirements(
     if wishes.accuracy_mm is not None:
         _check_positive("accuracy_mm", wishes.accuracy_mm)
         triangulation = replace(triangulation, max_sigma_m=wishes.accuracy_mm * 1e-3)
+    coarse = {} if wishes.pattern == "dense" else {"max_sample_distance_m": None}
     checked: dict[str, Any] = {
         key.replace("_mm", "_m"): _si(key, value)
         for key, value in table.check.model_dump().items()
@@ -87,7 +88,7 @@ def build_requirements(
         min_reachable=_share("min_reachable", wishes, shares),
         target=target,
         pattern=wishes.pattern,
-        projector=_limits_of(ProjectorLimits, table.limits, "projector_"),
+        projector=_limits_of(ProjectorLimits, table.limits, "projector_", **coarse),
         camera=_limits_of(CameraLimits, table.limits, "camera_"),
         triangulation=triangulation,
         check=CheckLimits(**checked, tau_m=tau_m),

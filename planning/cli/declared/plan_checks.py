@@ -46,10 +46,6 @@ def _check_without_rings(options: dict[str, Any]) -> None:
         raise click.UsageError(
             f"--ring-axis is of rings, and --pattern {pattern} has none: leave it out"
         )
-    if options["robust"] is not None:
-        raise click.UsageError(
-            f"--robust isn't built for --pattern {pattern}: rigs are drawn for rings"
-        )
 
 
 def _check_ranges(options: dict[str, Any]) -> None:

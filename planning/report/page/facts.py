@@ -104,6 +104,7 @@ def _limits(plan: RigPlan) -> dict[str, Any]:
         "too_dark": None if light is None else light.min_contrast,
         "clipped": None if light is None else 254.5,
         "conditioning": pair.min_conditioning,
+        "angle": list(pair.angles),
         "sigma": pair.max_sigma_m,
         "pitch": pair.min_ring_pitch_px,
     }

@@ -26,6 +26,7 @@ LIGHT_CAUSES = (
     "projector_range",
     "projector_incidence",
     "tangent_angle",
+    "pixel_distance",
     "projector_occlusion",
     "projector_body",
     "blocked_by_obstacle",
@@ -63,9 +64,20 @@ def light_steps(
         (length >= near) & (length <= far),
         -dot(samples.normals, along) >= np.cos(limits.max_incidence),
         np.abs(dot(samples.steep, along)) <= np.cos(limits.min_tangent_angle),
+        _pixels_on(projector, samples, along)
+        <= _or(limits.max_sample_distance_m, np.inf),
     )
     _pass_free(steps, OCCLUDED, projector, samples, (along, length), shadow)
     return steps
+
+
+def _pixels_on(
+    projector: AuditProjector, samples: AuditSamples, along: Array
+) -> Array:
+    """Return how wide the panel's pixels come out on the surface, shape (n,) [m]."""
+    z = in_frame(projector.world_from_device, samples.points)[:, 2]
+    squarely = np.maximum(-dot(samples.normals, along), 1e-9)
+    return projector.light.pixel_sides(z) / squarely
 
 
 def light_margin(
