@@ -28,7 +28,7 @@ from planning.model.document.certificates import (
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs import all_poses, camera_bound
 from planning.proofs.camera_bound import DEFAULT, PROVE, bound_cameras, camera_trees
-from planning.proofs.cells import measurable_cells
+from planning.proofs.cells import crossings
 from planning.proofs.cells.image_cone import image_cone
 from planning.proofs.cells.measurable_cells import MeasurableCells
 from planning.rig.rig import load_rig
@@ -263,10 +263,11 @@ def test_over_a_cone_the_largest_cosine_and_the_least_sine_to_a_line():
     """cos(max(0, a - psi)) of a direction at a, and sin(max(0, a - psi)) to a line."""
     a = np.radians(np.linspace(0.0, 180.0, 61))[:, None]
     psi = np.radians(np.linspace(0.0, 180.0, 61))[None, :]
-    nearest = measurable_cells._nearest(np.cos(a), np.cos(psi), np.sin(psi))
+    cone = crossings.Cone(a, psi, np.cos(psi), np.sin(psi))
+    nearest = crossings.nearest_cos(np.cos(a), cone)
     np.testing.assert_allclose(nearest, np.cos(np.maximum(a - psi, 0)), atol=1e-7)
     line = np.arccos(np.abs(np.cos(a)))
-    sine = measurable_cells._least_sine(np.cos(line), np.cos(psi), np.sin(psi))
+    sine = crossings._least_sine(np.cos(line), cone)
     np.testing.assert_allclose(sine, np.sin(np.maximum(line - psi, 0)), atol=1e-7)
 
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from planning.model.document.device_records import ProjectorRecord
 from planning.model.plan import RigPlan
 from planning.model.words import area_words, percent
 from planning.report.summary.coverage_lines import schedule_lines

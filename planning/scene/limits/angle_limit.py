@@ -35,7 +35,9 @@ class Angle(Limit[PairQuality, PairCell, TriangulationLimits]):
         return (largest >= low - ROUNDING) & (least <= high + ROUNDING)
 
     def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:
-        """Yield a smaller least angle, and a larger largest one."""
+        """Yield a smaller least angle, and a larger largest one; of rings neither."""
+        if facts.required.pattern == "rings":
+            return
         low, high = facts.required.triangulation.angles
 
         def met(pair: PairQuality) -> Array:
