@@ -10,6 +10,7 @@ from planning.verify.reconstruction.calibration import PairCalibration
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
 
+from .code_map import CodeMap
 from .edges import SATURATED, ImageEdges, find_edges
 from .lit_image import LitImage
 from .ring_chains import chains
@@ -64,6 +65,10 @@ class Decoded:
         n_saturated: Pixels that the white frame saturates.
         saturated: Some of them, (u, v) in the camera's image, shape (k, 2).
         lit: Which pixels show which annulus.
+        codes: Which pixels show which pixel of a projector that codes them; None: it
+            shows rings, or nothing.
+        residual_px: Median distance at which rays of both devices pass each other
+            [px of the projector]; NaN: of rings.
     """
 
     cloud: Cloud
@@ -75,6 +80,8 @@ class Decoded:
     n_saturated: int
     saturated: Array
     lit: LitImage
+    codes: CodeMap | None = None
+    residual_px: float = np.nan
 
     def with_rings(self, numbers: Indices) -> "Decoded":
         """Return this with the rings numbered anew, as a table of them says, (n,)."""
