@@ -1,6 +1,7 @@
 """Which pixel of a projector each pixel of a camera shows."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -27,6 +28,16 @@ class CodeMap:
     def told(self) -> Indices:
         """Flat indices of the pixels whose codes are known, shape (n,)."""
         return np.flatnonzero(np.isfinite(self.codes[:, :, 0]))
+
+    @cached_property
+    def per_pixel(self) -> float:
+        """By how many pixels of the projector codes differ in neighbours, median.
+
+        0 where no two neighbours tell a code.
+        """
+        steps = np.linalg.norm(np.diff(self.codes, axis=1), axis=2)
+        known = steps[np.isfinite(steps)]
+        return float(np.median(known)) if len(known) else 0.0
 
     def pixels(self, places: Indices) -> Array:
         """Return (u, v) in the camera's image of flat indices, shape (n, 2)."""

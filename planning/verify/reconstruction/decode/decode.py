@@ -92,6 +92,20 @@ class Decoded:
             edges=replace(self.edges, rings=rings),
         )
 
+    def with_camera(self, cloud: Cloud, k: int, n_asked: int) -> "Decoded":
+        """Return this with points that camera k measured by the same codes, too.
+
+        Of so many pixels; the others count as left out, as `other_camera`.
+        """
+        ring = np.full(len(cloud), -2 - k, dtype=np.int16)
+        lost = self.rejected.get("other_camera", 0) + n_asked - len(cloud)
+        return replace(
+            self,
+            cloud=Cloud.join([self.cloud, replace(cloud, ring=ring)]),
+            n_edges=self.n_edges + n_asked,
+            rejected=self.rejected | {"other_camera": lost},
+        )
+
     @classmethod
     def nothing(cls) -> "Decoded":
         """Return what a device that is off gives."""

@@ -93,7 +93,7 @@ def measure_codes(
     every = np.concatenate([early[early >= 0], outcome[asked]])
     good = asked & (outcome < 0)
     told = CodeMap(
-        np.where(whole[:, :, None], codes.codes, np.nan),
+        np.where(at_step[:, :, None], np.nan, codes.codes),
         codes.sigma,
         codes.corner,
         step,
