@@ -12,7 +12,7 @@ from planning.verify.reconstruction.patterns.dense_patterns import (
 )
 from planning.verify.reconstruction.patterns.ring_patterns import Frames
 
-from .line_light import gathered_lines
+from .line_light import drawn_share, gathered_lines
 from .photometry import Photometry
 from .render import ImageCanvas
 from .rendered_light import RenderedLight, Shown
@@ -67,18 +67,11 @@ class _DenseImages:
     ) -> None:
         self._canvas, self._shown, self._light = canvas, shown, light
         self._lens = photometry
-        width, height = shown.projector.resolution
-        # Blurred light of a panel's border is that of fewer pixels.
-        drawn = [
-            gathered_lines(
-                np.ones((n, 1), dtype=np.float32),
-                light.pixels[:, axis],
-                light.spread[:, axis],
-            )[:, 0]
-            for axis, n in enumerate((width, height))
+        self._drawn = [
+            drawn_share(n, light.pixels[:, axis], light.spread[:, axis])
+            for axis, n in enumerate(shown.projector.resolution)
         ]
-        self._drawn = drawn
-        self.white = self._image(drawn[0] * drawn[1])
+        self.white = self._image(self._drawn[0] * self._drawn[1])
 
     def images(self, pattern: DensePattern) -> Iterator[Grey]:
         """Yield the image of each frame of a pattern, whatever this one draws."""
@@ -107,28 +100,31 @@ class _DenseImages:
             if frame.kind == kind and frame.along == ALONG[axis]
         ]
         frames = [_like(own, frame) for frame in asked]
-        have = [frame for frame in frames if frame is not None]
         response, emitted = self._shown.design.response, self._shown.projector.response
-        lines = [emitted.light[response.levels(own.shares(frame))] for frame in have]
-        table = np.stack(lines, axis=1).astype(np.float32)
-        shares = gathered_lines(
-            table, self._light.pixels[:, axis], self._light.spread[:, axis]
-        )
-        shares *= self._drawn[1 - axis][:, None]
-        linear = response.is_linear and emitted.is_linear
-        columns = iter(shares.T)
+        # Frame and inverse make up white: half of the work is enough.
+        halves = response.is_linear and emitted.is_linear
+        have = [f for f in frames if f is not None and not (halves and f.inverse)]
+        shares = iter(self._shares(have, own, axis).T)
         image = self.white
         for frame in frames:
             if frame is None:
-                yield np.zeros_like(self.white)
-                continue
-            share = next(columns)
-            # Frame and inverse make up white: half of the work is enough.
-            if linear and frame.inverse:
+                image = np.zeros_like(self.white)
+            elif halves and frame.inverse:
                 image = self.white - image
             else:
-                image = self._image(share)
+                image = self._image(next(shares))
             yield image
+
+    def _shares(self, frames: list[DenseFrame], own: DensePattern, axis: int) -> Grey:
+        """Light of frames at each place as a share of white's, (n, n_frames)."""
+        response, emitted = self._shown.design.response, self._shown.projector.response
+        table = np.zeros((own.resolution[axis], len(frames)), dtype=np.float32)
+        for k, frame in enumerate(frames):
+            table[:, k] = emitted.light[response.levels(own.shares(frame))]
+        light = self._light
+        shares = gathered_lines(table, light.pixels[:, axis], light.spread[:, axis])
+        shares *= self._drawn[1 - axis][:, None]
+        return shares
 
     def _image(self, share: Grey) -> Grey:
         light = self._light

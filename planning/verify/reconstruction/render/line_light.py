@@ -45,6 +45,17 @@ def gathered_lines(lines: Grey, places: Array, spread: Array) -> Grey:
     return light
 
 
+def drawn_share(n_pixels: int, places: Array, spread: Array) -> Grey:
+    """Return the share of the light at places that a line of pixels gives, (n,).
+
+    1 but at its ends. Arguments are as of `gathered_lines`.
+    """
+    spread = np.maximum(spread, _SHARPEST_PX)
+    ends = (ndtr((end - places) / spread) for end in (-0.5, n_pixels - 0.5))
+    first, last = ends
+    return (last - first).astype(np.float32)
+
+
 def _gathered(padded: Grey, places: Array, spread: Array, half: int) -> Grey:
     """Light at places by so many pixels to either side, dark ones put before."""
     middle = np.rint(places).astype(np.int64)

@@ -24,6 +24,8 @@ _VAGUE, _FAINT = 0.04, 0.15
 # A pixel that gets less than this share of the light beside it shows another surface,
 # or the shade, too.
 _PARTLY = 0.6
+# Beside the panel's border light is missing that phases take to be there [px].
+_BORDER_PX = 2.0
 # Uniform over a stripe.
 _OF_STRIPE = 1.0 / np.sqrt(12.0)
 _FEWEST_SURE, _LEVELS, _ASKED = 200, 12, 20_000
@@ -135,7 +137,7 @@ def _along(
         faint = (phases.sigma > _VAGUE) | (phases.modulation < _FAINT * contrast / 2.0)
         sigma = phases.sigma * code.period_px
     n = pattern.resolution[axis]
-    outside = (places < -0.5) | (places > n - 0.5)
+    outside = (places < _BORDER_PX - 0.5) | (places > n - 0.5 - _BORDER_PX)
     return _Along(places, sigma, mixed, faint, outside, stripes)
 
 
