@@ -63,7 +63,7 @@ def read_gray(folder: Path, pattern: DensePattern) -> GrayImages:
     files, wanted = _files(folder), len(pattern.frames)
     width, height = pattern.resolution
     if len(files) != wanted:
-        gaps = _gaps(files)
+        gaps = _gaps(files, wanted)
         missing = f"; numbers {_some(gaps)} are missing" if gaps else ""
         raise CapturesError(
             f"{folder}: {len(files)} images, the Gray code of {width} x {height} px "
@@ -125,11 +125,12 @@ def _number(file: Path) -> int:
     return int(_NUMBER.findall(file.stem)[-1])
 
 
-def _gaps(files: Sequence[Path]) -> list[str]:
-    """Numbers that are missing between the first and the last."""
+def _gaps(files: Sequence[Path], wanted: int) -> list[str]:
+    """Numbers that are missing, of so many from 0 or 1 on."""
     numbers = {_number(file) for file in files}
-    every = range(min(min(numbers), 1), max(numbers) + 1)
-    return [str(n) for n in every if n not in numbers][: 1000]
+    first = 0 if 0 in numbers or max(numbers) < wanted else 1
+    every = range(first, max(first + wanted, min(max(numbers) + 1, 2 * wanted)))
+    return [str(n) for n in every if n not in numbers]
 
 
 def _some(names: Sequence[str]) -> str:
