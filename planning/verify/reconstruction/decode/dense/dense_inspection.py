@@ -35,6 +35,12 @@ _SURE = 0.3
 # A frame is its bit if it changes between stripes that follow each other in this share
 # of the places where it changes alone; fewer places say nothing.
 _MIN_NAMED, _FEWEST = 1.0 / 3.0, 30
+# Pixels by which frames are judged as a whole, about; a pixel breaks the rule of light
+# if its rest exceeds this share of its contrast and so many deviations of noise.
+_JUDGED, _REST_SHARE, _SIGMAS = 60_000, 0.1, 8.0
+# How far pixels are apart that are held against each other [px]: a border between them
+# may leave those on it unsure.
+_APART_PX = 2
 # Codes beyond the panel in more of the pixels are those of another one.
 _MOST_OUTSIDE = 0.05
 
@@ -65,10 +71,12 @@ def inspect_dense(
     clipped = clipped_pixels(window, lit, named)
     require_different(window, lit, named)
     good = lit & ~clipped
-    curved = bent(window[:n_paired], good)
+    few = _some_of(good)
+    curved = bent(window[:n_paired], few)
     if is_bent(curved):
-        window = in_light(window, tone_curve(window[:n_paired], good))
-    broken = broken_pixels(window[:n_paired], good, named[:n_paired])
+        window = in_light(window, tone_curve(window[:n_paired], few))
+    broken_pixels(window[:n_paired], few, named[:n_paired])
+    broken = good & _broken(window[:n_paired], few)
     require_order(window[:n_paired], good & ~broken, pattern, named)
     notes = tuple(
         f"{share:.1%} of the lit pixels {why}"
@@ -92,6 +100,32 @@ def inspect_dense(
     frames[:, broken] = 0
     frames[:, clipped] = 255
     return Frames(frames[np.argsort(order)], corner), notes
+
+
+def _some_of(good: Mask) -> Mask:
+    """Return a grid's part of pixels, enough to judge frames as a whole by."""
+    every = max(1, int(np.sqrt(np.count_nonzero(good) / _JUDGED)))
+    some = np.zeros_like(good)
+    some[::every, ::every] = good[::every, ::every]
+    return some
+
+
+def _broken(window: Images, few: Mask) -> Mask:
+    """Pixels of which a frame and its inverse don't add up to white and black.
+
+    Args:
+        window: White, black, then the bits, each with its inverse.
+        few: Pixels by which noise is judged.
+    """
+    both = window[0].astype(np.float32) + window[1]
+    contrast = np.subtract(window[0], window[1], dtype=np.float32)
+    most = _REST_SHARE * np.maximum(contrast, 1.0)
+    broken = np.zeros(contrast.shape, dtype=bool)
+    for k in range(2, len(window), 2):
+        rest = np.abs(window[k].astype(np.float32) + window[k + 1] - both)
+        spread = 1.4826 * float(np.median(rest[few])) if few.any() else 0.0
+        broken |= rest > most + _SIGMAS * max(spread, 1.0)
+    return broken
 
 
 def require_order(
@@ -147,17 +181,15 @@ def _changes(
     From the finest bit on.
     """
     flips, follow = np.zeros((2, n_bits), dtype=np.int64)
-    # Borders may be unsure: pixels on both sides of them, not those on them.
-    for step in (1, 2, 3):
-        for axis in (0, 1):
-            ahead, behind = [slice(None)] * 2, [slice(None)] * 2
-            ahead[axis], behind[axis] = slice(step, None), slice(-step)
-            one, other = tuple(ahead), tuple(behind)
-            both = sure[one] & sure[other]
-            changed = (code[one] ^ code[other])[both]
-            single = (changed > 0) & (changed & (changed - 1) == 0)
-            bit = np.log2(changed[single]).astype(np.int64)
-            next_to = np.abs(stripe[one][both] - stripe[other][both])[single] == 1
-            flips += np.bincount(bit, minlength=n_bits)
-            follow += np.bincount(bit[next_to], minlength=n_bits)
+    for axis in (0, 1):
+        ahead, behind = [slice(None)] * 2, [slice(None)] * 2
+        ahead[axis], behind[axis] = slice(_APART_PX, None), slice(-_APART_PX)
+        one, other = tuple(ahead), tuple(behind)
+        both = sure[one] & sure[other]
+        changed = (code[one] ^ code[other])[both]
+        single = (changed > 0) & (changed & (changed - 1) == 0)
+        bit = np.log2(changed[single]).astype(np.int64)
+        next_to = np.abs(stripe[one][both] - stripe[other][both])[single] == 1
+        flips += np.bincount(bit, minlength=n_bits)
+        follow += np.bincount(bit[next_to], minlength=n_bits)
     return flips, follow
