@@ -16,11 +16,13 @@ class CodeMap:
         codes: Pixels (u, v) of the projector; NaN: not told, shape (h, w, 2).
         sigma: Their standard deviations [px of the projector], shape (h, w, 2).
         corner: Pixel (u, v) of the top-left pixel in the camera's image.
+        moved: What uneven light had added to them, and was taken off, (h, w, 2).
         step: Of every so many pixels along rows and columns a point is made.
     """
 
     codes: Grey
     sigma: Grey
+    moved: Grey
     corner: tuple[int, int]
     step: int = 1
 

@@ -85,8 +85,10 @@ def read_capture(
             f"several codes at once; focus both devices"
         )
     scaled = CodeMap(
-        read.map.codes * np.float32(code_step),
-        read.map.sigma * np.float32(code_step),
+        *(
+            np.float32(code_step) * values
+            for values in (read.map.codes, read.map.sigma, read.map.moved)
+        ),
         read.map.corner,
     )
     return GrayCapture(replace(read, map=scaled), notes)

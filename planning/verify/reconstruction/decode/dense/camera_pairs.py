@@ -18,6 +18,7 @@ from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.decode.code_map import CodeMap
 
 from .dense_limits import DenseLimits
+from .uneven_light import UNSURE
 
 # A code lies this far from the pixel that shows it, at most [px].
 _BESIDE_PX = 1.0
@@ -49,6 +50,8 @@ def between_cameras(
     # Both cameras' codes are off; as pixels of the second camera, along its line.
     sigma_px, across_px = _along_line(by_code, np.sqrt(2.0) * spread, along, second)
     reach = np.linalg.norm(points - second.centre, axis=1)
+    moved = np.linalg.norm(codes.moved.reshape(-1, 2)[places], axis=1)
+    slope = np.sqrt(np.abs(np.linalg.det(by_code)))
     passes_px = gap / reach * second.focal_px
     cosine = np.clip(np.einsum("ij,ij->i", rays, beams), -1.0, 1.0)
     angle = np.arccos(cosine)
@@ -71,7 +74,7 @@ def between_cameras(
         shift=per_px[:, None] * rays,
         noise_px=sigma_px,
         blur_px=np.full(n, np.nan),
-        bias_px=np.full(n, _LEAST_OFF_PX),
+        bias_px=np.hypot(_LEAST_OFF_PX, np.sqrt(2.0) * UNSURE * moved * slope),
     )
     return cloud.take(good), n_asked
 

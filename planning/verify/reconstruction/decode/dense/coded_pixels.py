@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter
 
 from planning.verify.reconstruction.arrays import Array, Grey, Images, Indices, Mask
 from planning.verify.reconstruction.decode.code_map import CodeMap
@@ -15,15 +14,13 @@ from planning.verify.reconstruction.patterns.ring_patterns import Frames
 
 from .gray_bits import GrayStripes, read_stripes
 from .phase import Phases
+from .uneven_light import MOST_PX, moved_by, places_lit
 
 # Why a lit pixel may tell no code, in the order in which it is asked.
 CODE_CAUSES = ("mixed", "modulation", "outside_panel", "partly_lit")
 # Phases vaguer than this are none [turns], as are sinusoids of less than this share of
 # what white and black differ by.
 _VAGUE, _FAINT = 0.04, 0.15
-# A pixel that gets less than this share of the light beside it shows another surface,
-# or the shade, too.
-_PARTLY = 0.6
 # Beside the panel's border light is missing that phases take to be there [px].
 _BORDER_PX = 2.0
 # Uniform over a stripe.
@@ -76,12 +73,13 @@ def read_codes(frames: Frames, pattern: DensePattern) -> CodedPixels:
     half = noise.at(0.5 * (white + black).ravel()[lit])
     told = [_along(pixels, pattern, axis, contrast, half, noise) for axis in (0, 1)]
     one, other = told
-    least = _PARTLY * maximum_filter(difference, 3).ravel()[lit]
+    aside = places_lit(difference)
+    looks = np.linalg.norm(aside.reshape(-1, 2)[lit], axis=1)
     fails = {
         "mixed": one.mixed | other.mixed,
         "modulation": one.faint | other.faint,
         "outside_panel": one.outside | other.outside,
-        "partly_lit": contrast < least,
+        "partly_lit": ~(looks <= MOST_PX),
     }
     causes = np.full(len(lit), -1, dtype=np.int8)
     for cause in reversed(CODE_CAUSES):
@@ -91,8 +89,10 @@ def read_codes(frames: Frames, pattern: DensePattern) -> CodedPixels:
     for axis, along in enumerate(told):
         codes[lit[good], axis] = along.places[good]
         sigma[lit[good], axis] = along.sigma[good]
+    codes, sigma = (values.reshape(*shape, 2) for values in (codes, sigma))
+    moved = moved_by(aside, codes)
     return CodedPixels(
-        CodeMap(codes.reshape(*shape, 2), sigma.reshape(*shape, 2), frames.corner),
+        CodeMap(codes - moved, sigma, moved, frames.corner),
         lit,
         causes,
         (one.stripes, other.stripes),

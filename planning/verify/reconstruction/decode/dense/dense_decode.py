@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.ndimage import binary_dilation, label
 
-from planning.verify.reconstruction.arrays import Array, Indices, Mask
+from planning.verify.reconstruction.arrays import Array, Grey, Indices, Mask
 from planning.verify.reconstruction.calibration import PairCalibration
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.decode.code_map import CodeMap
@@ -16,6 +16,7 @@ from planning.verify.reconstruction.patterns.ring_patterns import Frames
 from .coded_pixels import CODE_CAUSES, CodedPixels, read_codes
 from .dense_limits import DenseLimits
 from .two_rays import TwoRays, meet_rays
+from .uneven_light import UNSURE
 
 # Saturated pixels that are kept as evidence, about.
 _SATURATED_KEPT = 500
@@ -95,11 +96,12 @@ def measure_codes(
     told = CodeMap(
         np.where(at_step[:, :, None], np.nan, codes.codes),
         codes.sigma,
+        codes.moved,
         codes.corner,
         step,
     )
     return Decoded(
-        cloud_of(met, pixels).take(good),
+        cloud_of(met, pixels, codes.moved.reshape(-1, 2)[places]).take(good),
         len(read.lit),
         int(np.count_nonzero(lit_asked)),
         {
@@ -116,8 +118,11 @@ def measure_codes(
     )
 
 
-def cloud_of(met: TwoRays, pixels: Array) -> Cloud:
-    """Return points of two rays that meet, all of them, of pixels (u, v), (n, 2)."""
+def cloud_of(met: TwoRays, pixels: Array, moved: Grey) -> Cloud:
+    """Return points of two rays that meet, all of them.
+
+    Of pixels (u, v), whose codes uneven light had moved, shape (n, 2) each.
+    """
     n = len(pixels)
     device = np.zeros(n, dtype=np.int16)
     return Cloud(
@@ -132,7 +137,7 @@ def cloud_of(met: TwoRays, pixels: Array) -> Cloud:
         shift=met.per_px[:, None] * met.rays,
         noise_px=met.sigma_px,
         blur_px=np.full(n, np.nan),
-        bias_px=np.full(n, _LEAST_OFF_PX),
+        bias_px=np.hypot(_LEAST_OFF_PX, UNSURE * np.linalg.norm(moved, axis=1)),
     )
 
 
