@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 from geometry.mesh.mesh import TriangleMesh
 from geometry.parallel import n_threads
 from planning.model.document.certificates import CamerasBy
-from planning.model.document.device_records import RingAxis
+from planning.model.document.ring_records import RingAxis
 from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
 from planning.model.progress import TIME_IS_UP, Report, Stopwatch
 from planning.report.assemble import write_plan
@@ -23,7 +23,7 @@ from planning.report.tolerance.robust import robustly
 from planning.rig.devices.lens_fit import check_fields
 from planning.rig.mounted import Mounted
 from planning.rig.rig import Rig
-from planning.rig.wishes import AccuracyOf, TargetName, Wishes
+from planning.rig.wishes import AccuracyOf, Pattern, TargetName, Wishes
 from planning.scene.interest import Select, Weight
 from planning.scene.ranges.ranged_body import RangedBody
 from planning.verify.verification import Verification, verify_plan
@@ -64,6 +64,7 @@ def plan_rig(
     up: str | None = None,
     ring_axis: RingAxis | None = None,
     robust: float | None = None,
+    pattern: Pattern = "rings",
     seed: int = 0,
     threads: int | None = None,
     check: bool = True,
@@ -107,6 +108,7 @@ def plan_rig(
             stand where errors are smallest, or `auto`: centred where that takes no
             more cameras and the check is passed; None: the rig's.
         robust: Share of drawn rigs that meet the requirements; None: none is drawn.
+        pattern: What projectors show: `rings`, or a `dense` code of every pixel.
         seed: The same seed gives the same plan.
         threads: Worker threads; no result depends on it. None: one for each core.
         check: Whether the plan is audited and reconstructed from pixels.
@@ -150,6 +152,7 @@ def plan_rig(
         up=up,
         ring_axis=ring_axis,
         robust=robust,
+        pattern=pattern,
     )
     # BLAS must not split sums differently with another number of threads.
     with (

@@ -38,6 +38,7 @@ _ASKED = (
     "up",
     "ring_axis",
     "robust",
+    "pattern",
     "seed",
     "prove",
     "cameras_by",

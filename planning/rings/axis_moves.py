@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from geometry.poses import inverse, transform
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.scene.camera_views import view_of
+from planning.scene.codes.patterns import inside_rings
 from planning.scene.draws import DRAWS
 from planning.scene.lights import light_of
 from planning.scene.limits.calibration_terms import calibration_px, surface_deviation
@@ -25,7 +26,6 @@ from planning.scene.measured import (
     pairs_of,
     taken,
 )
-from planning.scene.patterns import inside_rings
 from planning.scene.scene import Scene
 from solvers.poses.axis_problem import PITCH_POWER, AxisProgram
 from solvers.poses.axis_program import better_starts, solve_axis

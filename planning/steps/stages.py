@@ -12,11 +12,11 @@ from planning.cameras.camera_cover import (
     candidate_cover,
     measured_of,
 )
-from planning.cameras.camera_routes import cheapest, widest_routes
+from planning.cameras.camera_routes import Widened, cheapest, widest_routes
 from planning.cameras.camera_stage import CameraSolution, follow_cameras
 from planning.cameras.proved_cameras import CameraStage, bound_stage
 from planning.model.document.certificates import Certificate
-from planning.model.document.device_records import RingAxis
+from planning.model.document.ring_records import AxisTaken, RingAxis
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
@@ -146,6 +146,8 @@ def polished(partial: PartialPlan, clock: Stopwatch) -> PartialPlan:
             partial.camera_stage,
             spare_field=0.0 if ranges is None else ranges[1].angle_rad,
         )
+    if partial.request.ring_axis is None:
+        return _best_unringed(partial, every)
     with clock.stage("rings", "rings: axes and radii for the surface and the cameras"):
         ringed = [_with_rings(partial, stage, moved) for stage, moved in every]
         costs = [pixels_read(one.final_projectors, one.cameras) for one in ringed]
@@ -167,6 +169,14 @@ def polished(partial: PartialPlan, clock: Stopwatch) -> PartialPlan:
             partial.request.ring_margin,
         )
         return replace(partial, other_axes=others)
+
+
+def _best_unringed(partial: PartialPlan, every: Sequence[Widened]) -> PartialPlan:
+    """Cameras as they moved, of the route whose scan is cheaper."""
+    costs = [pixels_read(partial.projectors, moved.cameras) for _, moved in every]
+    stages = [stage for stage, _ in every]
+    best, stage = cheapest(tuple(zip(stages, costs, strict=True)))
+    return replace(partial, camera_stage=stage, cameras=every[best][1].cameras)
 
 
 def _with_rings(
@@ -292,9 +302,11 @@ def as_they_stand(ready: Prepared, clock: Stopwatch) -> PartialPlan:
         cameras = views.cameras[: len(scene.requirements.existing_of("camera"))]
         target = scene.target_samples(DRAWS.cameras)
         asked, margin = request.ring_axis, request.ring_margin
-        projectors, axes = standing_axes(
-            scene, projectors, views, target, axis=asked, margin=margin
-        )
+        axes: AxisTaken | None = None
+        if asked is not None:
+            projectors, axes = standing_axes(
+                scene, projectors, views, target, axis=asked, margin=margin
+            )
         samples, measured = measured_of(scene, projectors, views, target)
         cover = candidate_cover(scene, measured, samples, views.cameras)
         proof = unproved(cover, target.samples.weight)
@@ -304,9 +316,10 @@ def as_they_stand(ready: Prepared, clock: Stopwatch) -> PartialPlan:
             cameras,
             CameraCover(views, samples, measured, unsought(cover)),
         )
+    partial = PartialPlan(ready, stage, projectors, camera_stage, cameras, axes=axes)
+    if asked is None:
+        return partial
     with clock.stage("rings", "rings: radii for the surface and the cameras"):
         spacing = request.rig.rings.spacing
         rings = space_rings(scene, projectors, cameras, spacing, samples, margin=margin)
-    return PartialPlan(
-        ready, stage, projectors, camera_stage, cameras, axes=axes, rings=rings
-    )
+    return replace(partial, rings=rings)

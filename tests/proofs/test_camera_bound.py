@@ -32,11 +32,11 @@ from planning.proofs.cells import measurable_cells
 from planning.proofs.cells.image_cone import image_cone
 from planning.proofs.cells.measurable_cells import MeasurableCells
 from planning.rig.rig import load_rig
+from planning.scene.codes.surfaces import CodeSurfaces
 from planning.scene.draws import Draw
 from planning.scene.lights import ring_frame
 from planning.scene.limits import pair_limits
 from planning.scene.measured import LitSamples, lit_samples
-from planning.scene.patterns import CodeSurfaces
 from planning.scene.samples import LightOnSamples
 from planning.scene.workspace.candidates import aimed_poses
 from solvers.cells.cell_bound import CellStatus
@@ -96,7 +96,7 @@ def everything_lit(scene, n):
         target,
         lit,
         (light,),
-        (CodeSurfaces(across, 0.01 * one, np.zeros((len(one), 3)), *[one] * 4),),
+        (CodeSurfaces(*[one] * 4, across, 0.01 * one, np.zeros((len(one), 3))),),
     )
 
 
@@ -321,7 +321,7 @@ def test_what_any_place_and_aim_measures_is_admitted(limit, value, off, name):
     rows = replace(
         rows,
         lights=(light,),
-        surfaces=(CodeSurfaces(m, spacing, levers, *[cosine] * 4),),
+        surfaces=(CodeSurfaces(*[cosine] * 4, m, spacing, levers),),
     )
     limits = FREE | {limit: value, "calibration": off}
     required = scene_of(sphere(0.1), limits=limits).requirements

@@ -10,7 +10,7 @@ from support.plain_shapes import box
 from planning import RequirementError, RigPlan, load_rig, plan_rig
 from planning.report.summary.coverage_lines import coverage_lines
 from planning.report.summary.light_lines import light_lines
-from planning.scene.limits.pair_limits import TERMS
+from planning.scene.limits.pair_quality import TERMS
 from planning.verify.audit.audit import audit_plan
 from planning.verify.audit.audit_case import AuditCase, examine
 from planning.verify.audit.audit_findings import AuditFindings

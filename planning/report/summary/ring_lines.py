@@ -4,13 +4,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planning.model.document.device_records import (
+from planning.model.document.device_records import ProjectorRecord
+from planning.model.document.plan_document import PlanDocument
+from planning.model.document.ring_records import (
     OtherRings,
-    ProjectorRecord,
     RingSharesRecord,
     RingsRecord,
 )
-from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
 from planning.model.words import labelled, percent
 from planning.rings.acquisition import n_frames
@@ -79,7 +79,9 @@ def _rings_words(
     plan: RigPlan, projectors: Sequence[ProjectorRecord | OtherRings]
 ) -> str:
     counts = [len(projector.ring_radii) for projector in projectors]
-    return f"{sum(counts)} rings in {n_frames(counts, len(plan.cameras))} frames"
+    return (
+        f"{sum(counts)} rings in {n_frames(plan.projectors, len(plan.cameras))} frames"
+    )
 
 
 def _notes(record: ProjectorRecord, tolerance_m: float) -> list[str]:
