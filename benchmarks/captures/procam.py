@@ -120,9 +120,7 @@ def refitted(
     pair: PairCalibration, corners: list[tuple[Array, Array]]
 ) -> tuple[float, PairCalibration]:
     """The pair by its own corners: rms [px], both devices and their pose estimated."""
-    seen, shown = (
-        [one[k].astype(np.float32) for one in corners] for k in range(2)
-    )
+    seen, shown = ([one[k].astype(np.float32) for one in corners] for k in range(2))
     camera, projector = pair.camera, pair.projector
     width, height = CODE_PX
     rms, own, bent, matrix, lens, turn, shift, *_ = cv2.stereoCalibrate(

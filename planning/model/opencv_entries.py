@@ -72,9 +72,7 @@ def _xml(text: str) -> dict[str, tuple[int, int, str]]:
         raise ValueError(f"not XML ({error}); correct that place") from None
     found: dict[str, tuple[int, int, str]] = {}
     for node in root:
-        rows, cols = (
-            (node.findtext(key) or "").strip() for key in ("rows", "cols")
-        )
+        rows, cols = ((node.findtext(key) or "").strip() for key in ("rows", "cols"))
         if all(n.isascii() and n.isdigit() and len(n) < 5 for n in (rows, cols)):
             _keep(found, node.tag, (int(rows), int(cols), node.findtext("data") or ""))
     return found

@@ -62,7 +62,9 @@ def drawn_by(
     """Return what gives the grey levels (h, w) of a projector's frames for cameras."""
     dense = projector.dense
     if dense is not None:
-        return lambda frame: dense.levels(dense.frames[frame.number], projector.response)
+        return lambda frame: dense.levels(
+            dense.frames[frame.number], projector.response
+        )
     seen = {camera.id: projector.pattern_for(camera) for camera in cameras}
     canvas = PanelCanvas.of(projector, projector.pattern, seen)
     return lambda frame: frame_levels(

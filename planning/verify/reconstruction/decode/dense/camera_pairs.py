@@ -94,7 +94,9 @@ def _shown_at(codes: CodeMap, wanted: Array) -> tuple[Array, Array, Mask]:
     map_ = codes.codes.astype(np.float64)
     slopes = np.stack([_slope(map_, 1), _slope(map_, 0)], axis=-1).reshape(-1, 2, 2)
     flat = map_.reshape(-1, 2)
-    able = np.flatnonzero(np.isfinite(flat).all(axis=1) & np.isfinite(slopes).all((1, 2)))
+    able = np.flatnonzero(
+        np.isfinite(flat).all(axis=1) & np.isfinite(slopes).all((1, 2))
+    )
     found = np.zeros(len(wanted), dtype=bool)
     if len(able) == 0 or len(wanted) == 0:
         return np.zeros((0, 2)), np.zeros((0, 2, 2)), found
