@@ -23,7 +23,7 @@ from planning.verify.reconstruction.scanner import Scanner
 
 from .lattice import PanelEffects
 from .ring_fit import RingFit
-from .tiles import Tiles, plane_normals
+from planning.verify.reconstruction.check.tiles import Tiles, plane_normals
 
 # From here on it isn't noise but doubt of a pair, which no average makes less [px].
 _DOUBT_PX = 0.5
