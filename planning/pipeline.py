@@ -98,15 +98,13 @@ def plan_rig(
         dominant_coverage: Lit / reachable by projectors; None: the rig's.
         coverage: Measured / reachable by cameras; None: the rig's.
         min_reachable: Reachable by projectors / target; None: the rig's.
-        region_coverage: Floor of each dominant region, lit / reachable by projectors
-            and measured / reachable by cameras, 0 for none; None: the rig's.
+        region_coverage: Floor of both shares in each region, 0: none; None: the rig's.
         accuracy_mm: Largest standard deviation along the normal [mm]; None: the rig's.
         accuracy_of: Whether that is of the `total`, with what the rig says that its
             calibration leaves, or of `noise` alone.
         up: Axis that points up, `z` or `-y` and so on; None: the rig's.
-        ring_axis: Rings `centred` on what each projector lights, with axes `free` to
-            stand where errors are smallest, or `auto`: centred where that takes no
-            more cameras and the check is passed; None: the rig's.
+        ring_axis: Rings `centred` on what is lit, with axes `free` to stand where
+            errors are smallest, or `auto`; None: the rig's.
         robust: Share of drawn rigs that meet the requirements; None: none is drawn.
         pattern: What projectors show: `rings`, or a `dense` code of every pixel.
         seed: The same seed gives the same plan.

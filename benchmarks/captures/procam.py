@@ -4,7 +4,7 @@
 
 Needs OpenCV: pip install 'ringrig[captures]'. The board's 9 x 7 inner corners are found
 in the white image, decoded by local homographies and triangulated with the calibration
-that its authors' program estimated. Their projector's pixels are two to one of the code.
+that its authors' program estimated. Two pixels of their projector show one of the code.
 
 Then their camera is calibrated from the five white images; and both devices from the
 corners of the two complete poses, which are as many as are tested: what then stays off

@@ -30,8 +30,7 @@ class ProjectorLimits:
     Attributes:
         max_incidence: theta_max; -N.L >= cos(max_incidence) [rad].
         min_tangent_angle: tau_min; angle between L and the line of T1 [rad].
-        max_sample_distance_m: Largest p(z) / (-N.L), what a pixel of the panel covers
-            of the surface [m]; of a dense code only.
+        max_sample_distance_m: Largest p(z) / (-N.L) of a dense code's pixels [m].
     """
 
     max_incidence: float
@@ -57,7 +56,7 @@ class TriangulationLimits:
     """When a pair of projector and camera measures a point well enough.
 
     Attributes:
-        min_conditioning: Least |r.m|, rings only; 0 of other patterns.
+        min_conditioning: Least |r.m|; 0 without rings.
         noise_px: s_0, edge noise at frontal light [px].
         max_sigma_m: Largest s_N, or s of the whole budget [m].
         min_ring_pitch_px: Least distance of neighbouring rings in the image [px].

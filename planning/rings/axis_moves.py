@@ -208,7 +208,7 @@ def axis_program(
     # A pixel turns a ray by |J| / sqrt 2, whatever the direction, or nearly so.
     per_px = np.maximum(np.linalg.norm(jacobians, axis=(2, 3)), 1e-12) / np.sqrt(2.0)
     turned = calibration_px(errors, distances, per_px) * distances
-    levers = samples.surfaces[p].levers[chosen]
+    levers = samples.surfaces[p].on_average().levers[chosen]
     placed = np.hypot(surface_deviation(errors, levers), limits.ring_sigma_m or 0.0)
     conditioning = max(limits.min_conditioning, _LEAST_CONDITIONING)
     max_sigma, min_pitch = limits.max_sigma_m or np.inf, limits.min_ring_pitch_px or 0.0

@@ -113,7 +113,10 @@ def widest_gap(
     lit, the spacing over all samples stands in.
     """
     samples = lit_samples(scene, projectors, target)
-    gaps = [ring.spacing[samples.lit[:, p]] for p, ring in enumerate(samples.surfaces)]
+    gaps = [
+        ring.on_average().spacing[samples.lit[:, p]]
+        for p, ring in enumerate(samples.surfaces)
+    ]
     if not len(samples.target):
         gaps = [
             RingPattern(p).surfaces(target.samples.points).spacing for p in projectors

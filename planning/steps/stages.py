@@ -130,10 +130,9 @@ def placed(
 def _say_count(
     stage: ProjectorStage | CameraStage, devices: Sequence[object], clock: Stopwatch
 ) -> None:
-    clock.say(
-        f"  {len(devices)} of {len(stage.reference)} candidates; at least "
-        f"{stage.certificate.candidates.lower_bound} are needed"
-    )
+    bound = stage.certificate.candidates.lower_bound
+    words = f"{len(devices)} of {len(stage.reference)} candidates"
+    clock.say(f"  {words}; at least {bound} are needed")
 
 
 def polished(partial: PartialPlan, clock: Stopwatch) -> PartialPlan:
@@ -147,18 +146,14 @@ def polished(partial: PartialPlan, clock: Stopwatch) -> PartialPlan:
             spare_field=0.0 if ranges is None else ranges[1].angle_rad,
         )
     if partial.request.ring_axis is None:
-        return _best_unringed(partial, every)
+        return _best_unringed(partial, every, clock)
     with clock.stage("rings", "rings: axes and radii for the surface and the cameras"):
         ringed = [_with_rings(partial, stage, moved) for stage, moved in every]
         costs = [pixels_read(one.final_projectors, one.cameras) for one in ringed]
         stages = [one.camera_stage for one in ringed]
         best, stage = cheapest(tuple(zip(stages, costs, strict=True)))
         partial, moved = replace(ringed[best], camera_stage=stage), every[best][1]
-        if moved.smallest_before_m is not None and moved.smallest_after_m is not None:
-            clock.say(
-                f"  smallest baseline {1e3 * moved.smallest_before_m:.0f} -> "
-                f"{1e3 * moved.smallest_after_m:.0f} mm"
-            )
+        _say_baselines(moved, clock)
         if partial.request.ring_axis != "auto":
             return partial
         others = other_axes(
@@ -171,12 +166,21 @@ def polished(partial: PartialPlan, clock: Stopwatch) -> PartialPlan:
         return replace(partial, other_axes=others)
 
 
-def _best_unringed(partial: PartialPlan, every: Sequence[Widened]) -> PartialPlan:
+def _best_unringed(
+    partial: PartialPlan, every: Sequence[Widened], clock: Stopwatch
+) -> PartialPlan:
     """Cameras as they moved, of the route whose scan is cheaper."""
     costs = [pixels_read(partial.projectors, moved.cameras) for _, moved in every]
     stages = [stage for stage, _ in every]
     best, stage = cheapest(tuple(zip(stages, costs, strict=True)))
+    _say_baselines(every[best][1], clock)
     return replace(partial, camera_stage=stage, cameras=every[best][1].cameras)
+
+
+def _say_baselines(moved: WidestBaselines, clock: Stopwatch) -> None:
+    before, after = moved.smallest_before_m, moved.smallest_after_m
+    if before is not None and after is not None:
+        clock.say(f"  smallest baseline {1e3 * before:.0f} -> {1e3 * after:.0f} mm")
 
 
 def _with_rings(

@@ -26,6 +26,8 @@ UP = np.array([0.0, 0.0, 1.0])
 PLAIN = (0.0,) * 5
 BENT = (-0.12, 0.05, 0.001, -0.002, 0.01)
 
+_CODE, _LIGHT = DenseCode(), Photometry()
+
 
 def pose_at(position: Sequence[float]) -> np.ndarray:
     """A device that looks at the origin."""
@@ -49,7 +51,7 @@ def projector_at(
     name: str,
     position: Sequence[float],
     *,
-    code: DenseCode = DenseCode(),
+    code: DenseCode = _CODE,
     light: LightName = "diverging",
     size: tuple[int, int] = (640, 400),
     lens: tuple[float, ...] = PLAIN,
@@ -76,7 +78,7 @@ def frames_of(
     mesh: TriangleMesh,
     projector: ProjectorCalibration,
     camera: CameraCalibration,
-    photometry: Photometry = Photometry(),
+    photometry: Photometry = _LIGHT,
     seed: int = 1,
 ) -> Frames:
     """What a camera records under a projector."""

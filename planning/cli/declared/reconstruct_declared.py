@@ -16,7 +16,6 @@ from planning.cli.console import (
     threads_option,
 )
 
-
 _DENSE_ONLY = ("projector_size", "code_step", "unit")
 
 

@@ -120,7 +120,8 @@ def _least_moved(
     point; a pixel moves it by the least of the singular values of D.
     """
     errors = limits.limited_calibration
-    pixel = np.linalg.svd(coded.panel.per_px, compute_uv=False)[:, 1]
+    singular = np.linalg.svd(coded.panel.per_px, compute_uv=False)
+    pixel = singular[:, 1].astype(np.float64)
     offsets = coded.panel.offsets
     along = np.abs(dot(offsets, coded.beams))
     told = least_phase_px(coded.code, limits, incidence_cos) * pixel

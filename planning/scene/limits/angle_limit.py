@@ -41,7 +41,8 @@ class Angle(Limit[PairQuality, PairCell, TriangulationLimits]):
         low, high = facts.required.triangulation.angles
 
         def met(pair: PairQuality) -> Array:
-            return np.degrees(np.arccos(np.clip(pair.light_cos, -1.0, 1.0)))
+            cosine = np.ones(0) if pair.light_cos is None else pair.light_cos
+            return np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
 
         yield LimitRelaxation(
             self.name,

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from PIL import Image
 from scipy.spatial.transform import Rotation
+from support.dense_rigs import camera_at, dense_scanner, projector_at
+from support.reconstruction_rigs import changed, small_rig
 
 from geometry.mesh.sampling import sample_surface
 from geometry.shapes.primitives import sphere
@@ -25,8 +27,6 @@ from planning.verify.reconstruction.reconstruct import (
     reconstruct_twice,
 )
 from planning.verify.reconstruction.scanner import Scanner
-from support.dense_rigs import camera_at, dense_scanner, projector_at
-from support.reconstruction_rigs import changed, small_rig
 
 ANGLES = {"min_angle": np.deg2rad(8.0), "max_angle": np.deg2rad(60.0)}
 
@@ -78,7 +78,8 @@ def test_a_dense_scanner_passes_its_check(result, scanner):
     for pair in result.pairs:
         assert pair.n_edges == pair.n_points + sum(pair.rejected.values())
     document = result.record().to_document()
-    assert document["passed"] and document["n_merged"] == result.n_merged
+    assert document["passed"]
+    assert document["n_merged"] == result.n_merged
 
 
 def test_merged_points_are_as_sure_as_they_are_said(result):
@@ -89,7 +90,8 @@ def test_merged_points_are_as_sure_as_they_are_said(result):
     several = result.merged.shared[merged.stays]
     one = result.everything.take(merged.stays)
     noise = merged.cloud.noise_px / one.noise_px
-    assert np.median(noise[several]) < 0.85 and np.all(noise <= 1.0 + 1e-9)
+    assert np.median(noise[several]) < 0.85
+    assert np.all(noise <= 1.0 + 1e-9)
     assert np.median(merged.sigma[several]) < np.median(merged.sigma[~several])
 
 
@@ -205,7 +207,8 @@ def test_a_plan_with_a_code_is_checked(ball, tmp_path):
             camera["resolution"] = [320, 240]
 
     scanner = Scanner.of(changed(plan, code))
-    assert scanner.is_dense and scanner.limits.min_angle == 0.1
+    assert scanner.is_dense
+    assert scanner.limits.min_angle == 0.1
     assert scanner.frame_names(0, 0)[0] == "00-column-bit7"
     samples = sample_surface(ball, 500, seed=1)
     expected = Expected(samples, np.zeros(500, dtype=bool), np.full((1, 2), 0.5))
@@ -224,7 +227,8 @@ def test_a_plan_with_a_code_is_checked(ball, tmp_path):
         path.write_bytes(content)
     again = reconstruct_captured(folder, expected)
     told = " ".join(again.failures)
-    assert "P1 with C1: left out: " in told and "can't be the bit" in told
+    assert "P1 with C1: left out: " in told
+    assert "can't be the bit" in told
     names[3].unlink()
     assert "lacks 03-column-bit6-inverse" in " ".join(
         reconstruct_captured(folder, expected).failures

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.dense_rigs import BENT, camera_at, frames_of, projector_at, square
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import sphere
@@ -19,7 +20,6 @@ from planning.verify.reconstruction.decode.dense.two_rays import meet_rays
 from planning.verify.reconstruction.decode.grey_noise import GreyNoise
 from planning.verify.reconstruction.render.line_light import gathered_lines
 from planning.verify.reconstruction.render.photometry import Photometry
-from support.dense_rigs import BENT, camera_at, frames_of, projector_at, square
 
 NOISELESS = Photometry(noisy=False)
 EVEN = Photometry(noisy=False, albedo_variation=0.0)

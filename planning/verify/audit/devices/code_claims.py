@@ -32,23 +32,16 @@ def audit_codes(case: AuditCase, findings: AuditFindings) -> None:
             _audit_code(record, plan.document.rig.model_extra or {}, below)
     if not dense:
         return
+    axes = plan.document.ring_axes
+    findings.holds(axes is None, "ring_axes", "is stated, but a code has none")
     limits, space = plan.requirements.triangulation, plan.requirements.workspace
     for key, value, truth in (
-        ("requirements.triangulation.min_conditioning", limits.min_conditioning, 0.0),
-        (
-            "requirements.triangulation.min_ring_pitch_px",
-            limits.min_ring_pitch_px,
-            None,
-        ),
-        ("requirements.triangulation.ring_sigma_m", limits.ring_sigma_m, None),
-        (
-            "requirements.workspace.reference_ring_radius",
-            space.reference_ring_radius,
-            0.0,
-        ),
-        ("ring_axes", plan.document.ring_axes, None),
+        ("triangulation.min_conditioning", limits.min_conditioning, 0.0),
+        ("triangulation.min_ring_pitch_px", limits.min_ring_pitch_px, None),
+        ("triangulation.ring_sigma_m", limits.ring_sigma_m, None),
+        ("workspace.reference_ring_radius", space.reference_ring_radius, 0.0),
     ):
-        findings.same(key, value, truth, "that of a dense code", 0.0)
+        findings.same(f"requirements.{key}", value, truth, "that of a code", 0.0)
 
 
 def _audit_code(

@@ -113,7 +113,7 @@ def _of_codes(
     cloud: Cloud,
     normals: Array,
     camera: CameraCalibration,
-    second: CameraCalibration | ProjectorCalibration,
+    second: _Device,
     covariance: Array,
 ) -> Array:
     """Standard deviation of coded points by camera and second device, (18, 18).
@@ -128,7 +128,7 @@ def _of_codes(
     def along(points: Array) -> Array:
         return np.einsum("ij,ij->i", line, _seen(second, points))
 
-    def told(off: CameraCalibration | ProjectorCalibration) -> Array:
+    def told(off: _Device) -> Array:
         return np.einsum("ij,ij->i", line, _seen(off, cloud.points))
 
     return _moved(cloud, normals, camera, second, covariance, along, told)

@@ -89,7 +89,7 @@ def merge_dense(cloud: Cloud, plan: Scanner, *, cell_m: float) -> DenseMerged:
 
 
 def dense_normals(cloud: Cloud, plan: Scanner) -> Array:
-    """Return normals by the points around in each pair's image; NaN: too few, (n, 3)."""
+    """Return normals by points around in each pair's image; NaN: too few, (n, 3)."""
     normals = np.full((len(cloud), 3), np.nan)
     pair = cloud.projector.astype(np.int64) * len(plan.cameras) + cloud.camera
     for one in np.unique(pair):

@@ -103,6 +103,7 @@ def _contrast(stack: Images) -> Grey:
 
 
 def share_of_lit(some: Mask, whole: Mask) -> float:
+    """Return the share of the whole that some of it is; 0 of nothing."""
     return float(np.count_nonzero(some & whole) / max(1, np.count_nonzero(whole)))
 
 

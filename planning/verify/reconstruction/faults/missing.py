@@ -155,7 +155,7 @@ def _no_edges(supposed: Supposed, points: Array, normals: Array) -> str:
 def light_falls(
     projector: ProjectorCalibration, caster: RayCaster, points: Array, normals: Array
 ) -> Mask:
-    """Return whether a projector's pattern lights points [m] of the surface, shape (n,).
+    """Return whether a projector's pattern lights points [m] of the surface, (n,).
 
     By ray casting; points and unit normals have shape (n, 3).
     """

@@ -14,7 +14,6 @@ from planning.verify.reconstruction.calibration import PairCalibration
 from planning.verify.reconstruction.check.merge import Merged
 from planning.verify.reconstruction.check.tiles import Tiles, plane_normals
 from planning.verify.reconstruction.cloud import Cloud
-from planning.verify.reconstruction.decode.code_map import CodeMap
 from planning.verify.reconstruction.decode.decode import Decoded
 from planning.verify.reconstruction.decode.dense.coded_pixels import (
     CodedPixels,
@@ -84,13 +83,11 @@ def read_capture(
             f"{folder}: no pixel tells a code: {len(read.lit)} pixels are lit and show "
             f"several codes at once; focus both devices"
         )
-    scaled = CodeMap(
-        *(
-            np.float32(code_step) * values
-            for values in (read.map.codes, read.map.sigma, read.map.moved)
-        ),
-        read.map.corner,
+    codes, sigma, moved = (
+        np.float32(code_step) * values
+        for values in (read.map.codes, read.map.sigma, read.map.moved)
     )
+    scaled = replace(read.map, codes=codes, sigma=sigma, moved=moved)
     return GrayCapture(replace(read, map=scaled), notes)
 
 

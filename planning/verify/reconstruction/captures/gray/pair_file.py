@@ -12,7 +12,6 @@ import numpy as np
 
 from planning.model.errors import CalibrationError
 from planning.model.light.dense_code import DenseCode
-from planning.model.opencv_entries import opencv_matrices
 from planning.verify.reconstruction.arrays import Array
 from planning.verify.reconstruction.calibration import (
     CameraCalibration,
@@ -22,6 +21,8 @@ from planning.verify.reconstruction.calibration import (
 from planning.verify.reconstruction.light_laws import LIGHTS
 from planning.verify.reconstruction.patterns.dense_patterns import DensePattern
 from planning.verify.reconstruction.patterns.ring_patterns import DrawnRings
+
+from .opencv_entries import opencv_matrices
 
 # What programs call each; "roration" is what one of them writes.
 _NAMES = {
@@ -84,9 +85,10 @@ def _named(matrices: dict[str, Array], what: str) -> Array:
     names = [name for name in _NAMES[what] if name in matrices]
     if len(names) != 1:
         has = ", ".join(matrices) or "no matrix"
+        where = f"twice, as {' and '.join(names)}" if names else "nowhere"
         raise ValueError(
-            f"says the {what} {'twice, as ' + ' and '.join(names) if names else 'nowhere'}"
-            f"; write it once as one of {', '.join(_NAMES[what])} (it has {has})"
+            f"says the {what} {where}; write it once as one of "
+            f"{', '.join(_NAMES[what])} (it has {has})"
         )
     return matrices[names[0]]
 

@@ -79,7 +79,8 @@ def measure_codes(
     mixed = np.zeros(shape, dtype=bool)
     mixed.ravel()[read.lit[read.causes == CODE_CAUSES.index("mixed")]] = True
     at_step = depth_steps(depth, spread, limits.max_slant / camera.focal_px)
-    at_step |= binary_dilation(mixed, np.ones((3, 3), dtype=bool))
+    beside = binary_dilation(mixed, np.ones((3, 3), dtype=bool))
+    at_step |= np.asarray(beside, dtype=bool)
     whole = np.isfinite(depth) & ~at_step
     fails["depth_step"] = at_step.ravel()[places]
     fails["isolated"] = ~_hanging_together(whole).ravel()[places]
@@ -182,10 +183,11 @@ def _failures(met: TwoRays, limits: DenseLimits) -> dict[str, Mask]:
 
 def _hanging_together(whole: Mask) -> Mask:
     """Pixels of pieces that are large enough."""
-    pieces, n_pieces = label(whole)
-    size = np.bincount(np.ravel(pieces), minlength=n_pieces + 1)
+    pieces = np.zeros(whole.shape, dtype=np.int64)
+    label(whole, output=pieces)
+    size = np.bincount(pieces.ravel(), minlength=1)
     size[0] = 0
-    return np.asarray(size[pieces] >= _FEWEST)
+    return size[pieces] >= _FEWEST
 
 
 def _step(pixel_m: Array, spacing_m: float) -> int:

@@ -64,8 +64,8 @@ def inspect_dense(
     """
     w, n = pattern.white, len(stack)
     # White and black before the bits, as the rules of light take them.
-    order = np.array([w, w + 1, *range(w), *range(w + 2, n)])
-    window, corner = lit_part(stack[order])
+    order = [w, w + 1, *range(w), *range(w + 2, n)]
+    window, corner = lit_part(stack[np.array(order)])
     named = [names[k] for k in order]
     lit, n_paired = lit_pixels(window), w + 2
     clipped = clipped_pixels(window, lit, named)
@@ -156,7 +156,8 @@ def require_order(
         flips, follow = _changes(code, stripe, sure, n_bits)
         wrong = (flips >= _FEWEST) & (follow < _MIN_NAMED * flips)
         if wrong.any():
-            bad = [names[first + 2 * (n_bits - 1 - b)] for b in np.flatnonzero(wrong)]
+            late = np.flatnonzero(wrong).tolist()
+            bad = [names[first + 2 * (n_bits - 1 - b)] for b in late]
             raise CapturesError(
                 f"{', '.join(reversed(bad))} can't be the bit{'s' * (len(bad) > 1)} "
                 f"of {what} that the order says: stripes that follow each other differ "

@@ -77,6 +77,7 @@ def meet_rays(
     weight = scale / sigma
     with np.errstate(invalid="ignore", divide="ignore"):
         t = _first(weight, law.off_light(o[None], flat), law.off_light(r, flat, True))
+        slope, information = np.zeros_like(flat), np.zeros(len(t))
         for _ in range(_STEPS):
             local = o + t[:, None] * r
             # Behind the projector there is no light.

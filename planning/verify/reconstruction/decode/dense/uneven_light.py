@@ -32,9 +32,10 @@ def places_lit(contrast: Grey, blur_px: float = CAMERA_PX) -> Grey:
     aside: list[Grey] = []
     for axis in (1, 0):
         # Across, neighbours are averaged: noise counts for less.
-        level = convolve1d(light, np.array([0.25, 0.5, 0.25]), axis=1 - axis)
-        slope = _slope(level, axis) / level
-        aside.append(np.float32(blur_px**2) * slope)
+        level = np.empty_like(light)
+        convolve1d(light, np.array([0.25, 0.5, 0.25]), axis=1 - axis, output=level)
+        slope = np.float32(blur_px**2) * _slope(level, axis) / level
+        aside.append(slope.astype(np.float32))
     return np.stack(aside, axis=-1)
 
 
@@ -45,7 +46,7 @@ def moved_by(aside: Grey, codes: Grey) -> Grey:
     """
     across, down = _slope(codes, 1), _slope(codes, 0)
     moved = across * aside[:, :, :1] + down * aside[:, :, 1:]
-    return np.nan_to_num(moved)
+    return np.nan_to_num(moved).astype(np.float32)
 
 
 def _slope(values: Grey, axis: int) -> Grey:
@@ -59,6 +60,5 @@ def _slope(values: Grey, axis: int) -> Grey:
     step = values[tuple(one)] - values[tuple(other)]
     ahead[tuple(other)], behind[tuple(one)] = step, step
     either = np.where(np.isfinite(ahead), ahead, behind)
-    return np.where(
-        np.isfinite(ahead) & np.isfinite(behind), 0.5 * (ahead + behind), either
-    )
+    both = np.isfinite(ahead) & np.isfinite(behind)
+    return np.where(both, np.float32(0.5) * (ahead + behind), either)

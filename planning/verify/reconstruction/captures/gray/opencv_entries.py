@@ -9,9 +9,8 @@ import numpy as np
 
 from geometry.arrays import Array
 from geometry.files.file_content import file_content
-
-from .errors import InputError
-from .files import reading
+from planning.model.errors import InputError
+from planning.model.files import reading
 
 # Calibrations take a few kilobytes.
 _LARGEST = 1 << 20
