@@ -30,7 +30,6 @@ from planning.verify.verification import Verification, verify_plan
 
 from .steps.prepare import prepared, request_of, standing_devices
 from .steps.stages import (
-    as_they_stand,
     bounded_cameras,
     bounded_projectors,
     first_projectors,
@@ -39,6 +38,7 @@ from .steps.stages import (
     polished,
     with_free_axes,
 )
+from .steps.standing import as_they_stand
 
 Keep = Callable[[RigPlan], None]
 Checked = Callable[[RigPlan, Verification], None]

@@ -3,30 +3,27 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from planning.cameras.axis_choice import other_axes, place_for_axes, standing_axes
+from planning.cameras.axis_choice import other_axes, place_for_axes
 from planning.cameras.baselines.widest_baselines import WidestBaselines
 from planning.cameras.camera_cover import (
-    CameraCover,
     NothingMeasuredError,
     camera_candidate_views,
-    candidate_cover,
-    measured_of,
 )
 from planning.cameras.camera_routes import Widened, cheapest, widest_routes
 from planning.cameras.camera_stage import CameraSolution, follow_cameras
 from planning.cameras.proved_cameras import CameraStage, bound_stage
 from planning.model.document.certificates import Certificate
-from planning.model.document.ring_records import AxisTaken, RingAxis
+from planning.model.document.ring_records import RingAxis
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
-from planning.projectors.candidate_set import CandidateSet, NothingLitError
+from planning.projectors.candidate_set import NothingLitError
 from planning.projectors.exposures import with_exposures
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import ProjectorStage, plan_projectors
 from planning.projectors.proved_projectors import prove_fewest
 from planning.proofs import camera_bound, projector_bound
-from planning.proofs.candidate_certificate import larger, unproved, unsought
+from planning.proofs.candidate_certificate import larger
 from planning.report.advice.camera_relaxations import nothing_measured
 from planning.report.advice.projector_relaxations import nothing_lit
 from planning.report.advice.standing_inside import standing_inside
@@ -35,9 +32,6 @@ from planning.report.partial_plan import PartialPlan, Prepared
 from planning.report.region_claims import below_floor
 from planning.rings.acquisition import pixels_read
 from planning.rings.ring_stage import space_rings
-from planning.scene.draws import DRAWS
-
-from .prepare import offered
 
 
 def first_projectors(ready: Prepared, clock: Stopwatch) -> ProjectorStage:
@@ -287,43 +281,3 @@ def one_device_more(
 def _bound_words(proof: Certificate) -> str:
     bound = proof.continuous
     return "" if bound is None else f"at least {bound.lower_bound}, {bound.proof}"
-
-
-def as_they_stand(ready: Prepared, clock: Stopwatch) -> PartialPlan:
-    """Return the existing devices with their rings, and what candidates would reach."""
-    request, scene = ready.request, ready.scene
-    with clock.stage("projectors", "projectors: what they light as they stand"):
-        poses, views = offered(ready)
-        samples = scene.target_samples(DRAWS.projectors)
-        candidates = CandidateSet.over(scene, samples, poses)
-        projectors = candidates.projectors[: candidates.n_existing]
-        projectors = with_exposures(scene, projectors)
-        proof = unproved(candidates.cover, candidates.samples.samples.weight)
-        stage = ProjectorStage(
-            {len(projectors): projectors}, proof, projectors, candidates
-        )
-    with clock.stage("cameras", "cameras: what they measure as they stand"):
-        cameras = views.cameras[: len(scene.requirements.existing_of("camera"))]
-        target = scene.target_samples(DRAWS.cameras)
-        asked, margin = request.ring_axis, request.ring_margin
-        axes: AxisTaken | None = None
-        if asked is not None:
-            projectors, axes = standing_axes(
-                scene, projectors, views, target, axis=asked, margin=margin
-            )
-        samples, measured = measured_of(scene, projectors, views, target)
-        cover = candidate_cover(scene, measured, samples, views.cameras)
-        proof = unproved(cover, target.samples.weight)
-        camera_stage = CameraStage(
-            {len(cameras): cameras},
-            proof,
-            cameras,
-            CameraCover(views, samples, measured, unsought(cover)),
-        )
-    partial = PartialPlan(ready, stage, projectors, camera_stage, cameras, axes=axes)
-    if asked is None:
-        return partial
-    with clock.stage("rings", "rings: radii for the surface and the cameras"):
-        spacing = request.rig.rings.spacing
-        rings = space_rings(scene, projectors, cameras, spacing, samples, margin=margin)
-    return replace(partial, rings=rings)
