@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 from geometry.mesh.mesh import TriangleMesh
 from geometry.parallel import n_threads
 from planning.model.document.certificates import CamerasBy
-from planning.model.document.device_records import RingAxis
+from planning.model.document.ring_records import RingAxis
 from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
 from planning.model.progress import TIME_IS_UP, Report, Stopwatch
 from planning.report.assemble import write_plan
@@ -22,7 +22,7 @@ from planning.report.tolerance.robust import robustly
 from planning.rig.devices.lens_fit import check_fields
 from planning.rig.mounted import Mounted
 from planning.rig.rig import Rig
-from planning.rig.wishes import AccuracyOf, TargetName, Wishes
+from planning.rig.wishes import AccuracyOf, Pattern, TargetName, Wishes
 from planning.scene.interest import Select, Weight
 from planning.scene.ranges.ranged_body import RangedBody
 from planning.verify.verification import Verification, verify_plan
@@ -30,7 +30,6 @@ from planning.verify.verification import Verification, verify_plan
 from .steps.checked import with_check
 from .steps.prepare import prepared, request_of, standing_devices
 from .steps.stages import (
-    as_they_stand,
     bounded_cameras,
     bounded_projectors,
     first_projectors,
@@ -39,6 +38,7 @@ from .steps.stages import (
     polished,
     with_free_axes,
 )
+from .steps.standing import as_they_stand
 from .steps.surviving import (
     check_survival,
     one_more_for_losses,
@@ -71,6 +71,7 @@ def plan_rig(
     robust: float | None = None,
     views: int | None = None,
     survive: int = 0,
+    pattern: Pattern = "rings",
     seed: int = 0,
     threads: int | None = None,
     check: bool = True,
@@ -104,20 +105,19 @@ def plan_rig(
         dominant_coverage: Lit / reachable by projectors; None: the rig's.
         coverage: Measured / reachable by cameras; None: the rig's.
         min_reachable: Reachable by projectors / target; None: the rig's.
-        region_coverage: Floor of each dominant region, lit / reachable by projectors
-            and measured / reachable by cameras, 0 for none; None: the rig's.
+        region_coverage: Floor of both shares in each region, 0: none; None: the rig's.
         accuracy_mm: Largest standard deviation along the normal [mm]; None: the rig's.
         accuracy_of: Whether that is of the `total`, with what the rig says that its
             calibration leaves, or of `noise` alone.
         up: Axis that points up, `z` or `-y` and so on; None: the rig's.
-        ring_axis: Rings `centred` on what each projector lights, with axes `free` to
-            stand where errors are smallest, or `auto`: centred where that takes no
-            more cameras and the check is passed; None: the rig's.
+        ring_axis: Rings `centred` on what is lit, with axes `free` to stand where
+            errors are smallest, or `auto`; None: the rig's.
         robust: Share of drawn rigs that meet the requirements; None: none is drawn.
         views: Different pairs of projector and camera, at least, that measure what
             counts as covered; None: one.
         survive: Devices, 0 or 1, of which any may be lost: what is left still meets
             the requirements.
+        pattern: What projectors show: `rings`, or a `dense` code of every pixel.
         seed: The same seed gives the same plan.
         threads: Worker threads; no result depends on it. None: one for each core.
         check: Whether the plan is audited and reconstructed from pixels.
@@ -163,6 +163,7 @@ def plan_rig(
         robust=robust,
         views=views,
         survive=survive,
+        pattern=pattern,
     )
     # BLAS must not split sums differently with another number of threads.
     with (

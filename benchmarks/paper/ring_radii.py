@@ -28,7 +28,7 @@ from planning.rings.ring_limits import ring_beam
 from planning.rings.ring_radii import uniform_radii
 from planning.rings.ring_spacing import spaced_radii
 from planning.rings.ring_stage import space_rings
-from planning.scene.patterns import pattern_of
+from planning.scene.codes.patterns import pattern_of
 from planning.scene.scene import Scene
 
 ROOT = Path(__file__).resolve().parents[2]

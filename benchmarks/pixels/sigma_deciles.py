@@ -27,7 +27,7 @@ from geometry.shapes.primitives import sphere
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import CameraLimits, TriangulationLimits
 from planning.scene import lighting, measurability
-from planning.scene.patterns import pattern_of
+from planning.scene.codes.patterns import pattern_of
 from planning.scene.samples import Target
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.render.photometry import Photometry

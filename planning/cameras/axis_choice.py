@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from planning.model.document.certificates import CamerasBy
-from planning.model.document.device_records import AxisTaken, RingAxis
+from planning.model.document.ring_records import AxisTaken, RingAxis
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.rings.acquisition import pixels_read
 from planning.rings.axis_moves import move_ring_axes
@@ -44,10 +44,10 @@ def place_for_axes(
     candidates: CandidateViews,
     by: CamerasBy,
     *,
-    axis: RingAxis,
+    axis: RingAxis | None,
     margin: float,
 ) -> CameraSolution:
-    """Choose cameras for ring axes as they are wanted.
+    """Choose cameras for ring axes as they are wanted; None: there are none.
 
     `auto` takes centred axes if they take no more cameras than free ones: either that
     was proved over the candidates, or these are planned as well. The margin is how far
@@ -56,8 +56,8 @@ def place_for_axes(
     Raises:
         NothingMeasuredError: If no candidate measures any lit sample.
     """
-    if axis == "free":
-        return place_cameras(scene, projectors, candidates, by)
+    if axis is None or axis == "free":
+        return place_cameras(scene, projectors, candidates, by, axis)
     middle = centred_axes(scene, projectors, margin)
     try:
         taken = cover_axes(scene, middle, candidates, by, "centred")

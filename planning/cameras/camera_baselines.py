@@ -20,7 +20,7 @@ from planning.proofs.quotas import Quotas, RegionFloors
 from planning.scene.bodies.clearance import lacks_clearance
 from planning.scene.draws import DRAWS
 from planning.scene.limits.calibration_terms import surface_deviation
-from planning.scene.measurability import expected_noise_px
+from planning.scene.measurability import expected_noise_px, expected_sigma_m
 from planning.scene.measured import (
     LitSamples,
     lit_samples,
@@ -68,12 +68,13 @@ class BaselineSamples:
     def rings(self) -> RingsOnSurface:
         """The rings of every projector on the samples."""
         limits = self.scene.requirements.triangulation
-        levers = np.stack([rings.levers for rings in self.lit.surfaces])
+        coded = [surfaces.on_average() for surfaces in self.lit.surfaces]
+        levers = np.stack([rings.levers for rings in coded])
         placed = surface_deviation(limits.limited_calibration, levers)
         away = float(np.mean(self.scene.requirements.workspace.camera_radius_m))
         return RingsOnSurface(
-            np.stack([rings.normals for rings in self.lit.surfaces]),
-            np.stack([rings.spacing for rings in self.lit.surfaces]),
+            np.stack([rings.normals for rings in coded]),
+            np.stack([rings.spacing for rings in coded]),
             np.stack(
                 [
                     expected_noise_px(limits, light, rings, away)
@@ -83,7 +84,19 @@ class BaselineSamples:
                 ]
             ),
             self.lit.lit,
-            np.hypot(placed, limits.ring_sigma_m or 0.0),
+            np.hypot(placed, self._told),
+            turning=self.scene.requirements.pattern == "dense",
+        )
+
+    @property
+    def _told(self) -> NDArray[np.float64]:
+        """Standard deviation of the code itself along m [m], shape (n_p, n)."""
+        limits = self.scene.requirements.triangulation
+        return np.stack(
+            [
+                expected_sigma_m(limits, light, coded)
+                for light, coded in zip(self.lit.lights, self.lit.surfaces, strict=True)
+            ]
         )
 
     def count_lit(self, cameras: Sequence[PlannedCamera]) -> int:
@@ -250,9 +263,10 @@ def _count(measured: NDArray[np.bool_]) -> int:
 def baseline_limits(scene: Scene, spare_field: float = 0.0) -> BaselineLimits:
     """Return what binds a camera; `spare_field` as for `widen_baselines`."""
     required = scene.requirements
+    low, _ = required.triangulation.angles
     return BaselineLimits(
         required.camera.max_incidence,
-        required.triangulation.min_conditioning,
+        max(required.triangulation.min_conditioning, np.sin(low)),
         scene.safe_workspace,
         required.triangulation.min_ring_pitch_px,
         required.triangulation.max_sigma_m,

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planning.model.document.certificates import CamerasBy, Certificate
-from planning.model.document.device_records import AxisTaken
+from planning.model.document.ring_records import AxisTaken
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.selection import Selection
 from planning.rings.axis_moves import move_ring_axes
@@ -28,7 +28,7 @@ class CameraSolution:
 
     projectors: tuple[PlannedProjector, ...]
     stage: CameraStage
-    axes: AxisTaken = "free"
+    axes: AxisTaken | None = "free"
 
 
 def place_cameras(
@@ -36,7 +36,7 @@ def place_cameras(
     projectors: tuple[PlannedProjector, ...],
     candidates: CandidateViews,
     by: CamerasBy = "both",
-    axes: AxisTaken = "free",
+    axes: AxisTaken | None = "free",
 ) -> CameraSolution:
     """Choose cameras, move free ring axes for them, and see which route is better."""
     cover = cover_axes(scene, projectors, candidates, by, axes)
@@ -49,7 +49,7 @@ class AxesCover:
 
     projectors: tuple[PlannedProjector, ...]
     cover: CameraCover
-    axes: AxisTaken
+    axes: AxisTaken | None
 
 
 def cover_axes(
@@ -57,7 +57,7 @@ def cover_axes(
     projectors: tuple[PlannedProjector, ...],
     candidates: CandidateViews,
     by: CamerasBy,
-    axes: AxisTaken,
+    axes: AxisTaken | None,
 ) -> AxesCover:
     """Choose cameras, and move free ring axes for them."""
     cover = cover_for(scene, projectors, candidates, by)

@@ -21,7 +21,7 @@ from planning.model.calibration_errors import PERFECT
 from planning.model.planned import PlannedProjector
 from planning.model.requirements import TriangulationLimits
 from planning.scene.camera_views import CameraView
-from planning.scene.limits.pair_limits import NOISE_TERMS
+from planning.scene.limits.pair_quality import NOISE_TERMS
 from planning.scene.measured import LitSamples, Pair, pairs_of
 
 _Array = NDArray[np.float64]
@@ -153,7 +153,8 @@ def _errors(
     """Projector, s_N, then errors by the projector's and the camera's, (k, 19)."""
     errors, view = limits.calibration or PERFECT, pair.quality.view.take(some)
     rows, seen = pair.samples[some], samples.target.samples
-    surfaces, points = samples.surfaces[pair.projector].take(rows), seen.points[rows]
+    coded, points = samples.surfaces[pair.projector].take(rows), seen.points[rows]
+    surfaces = coded.towards(view.rays)
     r, m, t = view.rays, surfaces.normals, view.distances[:, None]
     along = np.einsum("ij,ij->i", r, m)[:, None]
     facing = view.facing[:, None]

@@ -136,6 +136,22 @@ def signed_limits(
     return 1e-3 * numbers[0], 1e-3 * numbers[1]
 
 
+def panel_size(
+    context: click.Context, option: click.Parameter, value: str | None
+) -> tuple[int, int] | None:
+    """Read WIDTHxHEIGHT in pixels."""
+    if value is None:
+        return None
+    sides = value.lower().split("x")
+    if len(sides) != 2 or not all(
+        side.isascii() and side.isdigit() and 2 <= int(side) <= 16384 for side in sides
+    ):
+        raise click.BadParameter(
+            f"{value!r} must be width and height in pixels, 2 to 16384, as 1024x768"
+        )
+    return int(sides[0]), int(sides[1])
+
+
 def given(options: Mapping[str, Any], *names: str) -> dict[str, Any]:
     """Return those of some options that have a value."""
     return {name: options[name] for name in names if options[name] is not None}

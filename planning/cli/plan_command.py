@@ -40,6 +40,7 @@ _ASKED = (
     "robust",
     "views",
     "survive",
+    "pattern",
     "seed",
     "prove",
     "cameras_by",

@@ -30,10 +30,12 @@ class ProjectorLimits:
     Attributes:
         max_incidence: theta_max; -N.L >= cos(max_incidence) [rad].
         min_tangent_angle: tau_min; angle between L and the line of T1 [rad].
+        max_sample_distance_m: Largest p(z) / (-N.L) of a dense code's pixels [m].
     """
 
     max_incidence: float
     min_tangent_angle: float
+    max_sample_distance_m: float | None = None
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ class TriangulationLimits:
     """When a pair of projector and camera measures a point well enough.
 
     Attributes:
-        min_conditioning: Least |r.m|, rings only.
+        min_conditioning: Least |r.m|; 0 without rings.
         noise_px: s_0, edge noise at frontal light [px].
         max_sigma_m: Largest s_N, or s of the whole budget [m].
         min_ring_pitch_px: Least distance of neighbouring rings in the image [px].
@@ -79,6 +81,12 @@ class TriangulationLimits:
     accuracy_of: Literal["noise", "total"] = "total"
     drawn_edges: DrawnEdges | None = None
     light: LightBudget | None = None
+
+    @property
+    def angles(self) -> tuple[float, float]:
+        """Least and largest triangulation angle; all where none is stated [rad]."""
+        low, high = self.min_angle, self.max_angle
+        return low or 0.0, pi if high is None else high
 
     @property
     def limited_calibration(self) -> CalibrationErrors:
@@ -143,7 +151,7 @@ class Workspace:
         n_reference_projectors: Poses in the projectors' reference set.
         n_reference_cameras: Poses in the cameras' reference set.
         reference_ring_radius: Outermost ring of the reference projectors: its tangent
-            R (diverging) or its radius in [m] (parallel).
+            R (diverging) or its radius in [m] (parallel); 0 without rings.
         bearing: Unit vector across `axis`, turning with the object, from which
             candidates are laid out; None: a world axis decides.
         box: Room that holds every device; None: no room.
@@ -258,7 +266,8 @@ class Requirements:
         dominant_coverage: Lit area / area reachable by projectors, on the target.
         min_reachable: Area reachable by projectors / target area.
         target: `dominant` regions, or the whole `surface`.
-        pattern: `rings`; `dense` and `none` come later.
+        pattern: What projectors show: `rings`, or a `dense` code of every pixel; of
+            `none` there is no projector.
         existing: Devices that stand already and are part of every plan.
         region_coverage: Floor of each dominant region: lit area / area reachable by
             projectors, and measured area / area reachable by cameras; 0: no floor.
@@ -305,6 +314,7 @@ class Requirements:
             (document["workspace"], _LEFT_OUT),
             (document, ("existing", "robust", "stock", "survival")),
             (document["triangulation"], ("light",)),
+            (document["projector"], ("max_sample_distance_m",)),
         ]
         for table, names in devices + tables:
             for name in names:

@@ -9,11 +9,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from planning.model.planned import PlannedProjector
+from planning.scene.codes.patterns import panel_light
 from planning.scene.draws import DRAWS
 from planning.scene.lighting import light_on, lit_stages
 from planning.scene.limits.light_terms import electrons
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.patterns import panel_light
 from planning.scene.scene import Scene
 
 

@@ -13,10 +13,10 @@ from planning.model.planned import PlannedProjector
 from planning.proofs.losses import light_kept, still_lit
 from planning.proofs.quotas import Quotas
 from planning.scene.bodies.clearance import lacks_clearance
+from planning.scene.codes.patterns import pattern_of
 from planning.scene.draws import DRAWS
 from planning.scene.lighting import lit_margins, lit_stages
 from planning.scene.limits import projector_limits
-from planning.scene.patterns import RingPattern
 from planning.scene.placed_bodies import moves_bodies
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
@@ -241,7 +241,7 @@ def pose_program(
         half_angle=workspace.half_angle,
         sides=device.sides(_PIXEL_MARGIN),
         beam_radius_m=device.beam_reach,
-        ring_radius=RingPattern(projector).outermost,
+        ring_radius=pattern_of(projector).outermost,
         ring_from_device=inverse(projector.world_from_ring)
         @ projector.world_from_device,
         up=up,

@@ -16,9 +16,9 @@ from planning.proofs.all_poses import (
 from planning.proofs.projector_bound import bound_projectors
 from planning.proofs.quotas import RegionFloors
 from planning.proofs.selection import fewest_count, select_fewest
+from planning.scene.codes.patterns import pattern_of
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.patterns import pattern_of
 from planning.scene.placed_bodies import existing_devices
 from planning.scene.samples import Target
 from planning.scene.scene import Scene

@@ -39,6 +39,7 @@ from planning.report.entries.range_entries import ranges_record, with_spread
 from planning.report.entries.survival_entries import survival_record
 from planning.report.entries.violations import violations
 from planning.rings.ring_pitch import widest_gap
+from planning.scene.measured import widest_pixel
 from planning.scene.placed_bodies import Device
 from planning.scene.scene import Scene
 
@@ -47,6 +48,10 @@ from .entries import device_entries as entries
 from .judged import Devices
 from .marginal import marginal_records
 from .partial_plan import PartialPlan, Prepared
+
+# A point must be found within a ring gap, or so many pixels of the panel: at steps and
+# borders a decoder leaves some out.
+_TAU_PIXELS = 4.0
 
 
 def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
@@ -187,15 +192,20 @@ def _surface_record(partial: PartialPlan, surface: Surface) -> SurfaceRecord:
 
 
 def _final_requirements(scene: Scene, claims: Claims, devices: Devices) -> Requirements:
-    """State tau, one ring gap, and the reference sets as they are."""
+    """State tau and the reference sets as they are."""
     requirements = scene.requirements
     workspace = replace(
         requirements.workspace,
         n_reference_projectors=len(devices.reference_projectors),
         n_reference_cameras=len(devices.reference_cameras),
     )
-    gap = widest_gap(scene, devices.projectors, claims.target_samples)
-    check = replace(requirements.check, tau_m=round(gap, 6))
+    nearest = (
+        widest_gap(scene, devices.projectors, claims.target_samples)
+        if requirements.pattern == "rings"
+        else _TAU_PIXELS
+        * widest_pixel(scene, devices.projectors, claims.target_samples)
+    )
+    check = replace(requirements.check, tau_m=round(nearest, 6))
     return replace(requirements, workspace=workspace, check=check)
 
 

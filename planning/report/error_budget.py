@@ -4,7 +4,7 @@ import numpy as np
 
 from planning.model.document.coverage_records import PredictedSigma
 from planning.scene.camera_views import view_of
-from planning.scene.limits.pair_limits import NOISE_TERMS
+from planning.scene.limits.pair_quality import NOISE_TERMS
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.measured import LitSamples, pairs_of
 from planning.scene.scene import Scene

@@ -7,7 +7,7 @@ from geometry.parallel import n_threads
 from geometry.regions.regions import DominantRegions
 from planning.cameras.proved_cameras import CameraStage
 from planning.model.document.certificates import CamerasBy
-from planning.model.document.device_records import AxisTaken, RingAxis
+from planning.model.document.ring_records import AxisTaken, RingAxis
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.projectors.projector_stage import ProjectorStage
 from planning.proofs.surviving_counts import SurvivingCount
@@ -53,8 +53,10 @@ class PlanRequest:
     least_projectors: int = 0
 
     @property
-    def ring_axis(self) -> RingAxis:
-        """Where ring axes may stand."""
+    def ring_axis(self) -> RingAxis | None:
+        """Where ring axes may stand; None: the pattern has none."""
+        if self.wishes.pattern != "rings":
+            return None
         return self.axis_wanted or self.wishes.ring_axis or self.rig.rings.axis
 
     @property
@@ -96,7 +98,7 @@ class PartialPlan:
     projectors: tuple[PlannedProjector, ...]
     camera_stage: CameraStage
     cameras: tuple[PlannedCamera, ...]
-    axes: AxisTaken = "free"
+    axes: AxisTaken | None = "free"
     truncated: bool = False
     rings: RingStage | None = None
     other_axes: tuple[PlannedProjector, ...] = ()

@@ -33,8 +33,9 @@ from .devices.rig_devices import (
 from .devices.rig_models import Light, RigDevices, pinhole_of
 from .object_size import ObjectSize
 from .obstacle_tables import obstacles_of
+from .pattern_tables import DenseTable, RingsTable
 from .rig_requirements import build_requirements, build_workspace, limit_notes
-from .rig_tables import MountingTable, RingsTable
+from .rig_tables import MountingTable
 from .toml.rig_files import changed, read_rig, rig_folder
 from .wishes import Wishes
 
@@ -225,6 +226,8 @@ class Rig(RigDevices):
             for key in ("existing", "obstacle")
             if getattr(table, key)
         }
+        if table.dense != DenseTable():
+            listed["dense"] = table.dense.model_dump()
         if table.mounting != MountingTable():
             listed["mounting"] = table.mounting.model_dump()
         if table.photometry is not None:

@@ -23,13 +23,15 @@ from planning.model.requirements import (
 from planning.scene.workspace.zone_conflicts import check_zones
 
 from .rig_tables import LimitsTable, RequirementsTable, RigTable
-from .wishes import Wishes
+from .wishes import Pattern, Wishes
 
 _Limits = TypeVar("_Limits", ProjectorLimits, CameraLimits, TriangulationLimits)
 
 _WARN_INCIDENCE_DEG = 70.0
 # Pairs that may be asked for of each point: more are no survival but another rig.
 MOST_VIEWS = 8
+# Triangulation angles where a rig states none: errors grow as 1 / sin beyond [rad].
+_ANGLES = (math.radians(10.0), math.radians(90.0))
 
 _UP_VECTORS = {
     **{"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)},
@@ -54,7 +56,7 @@ def build_requirements(
     shares = table.requirements
     target = wishes.target or "dominant"
     _check_choice("target", target, ("dominant", "surface"))
-    _check_choice("pattern", wishes.pattern, ("rings", "dense", "none"))
+    _check_choice("pattern", wishes.pattern, ("rings", "dense"))
     for name in ("max_projectors", "max_cameras"):
         most = getattr(wishes, name)
         if most is not None and not most >= 1:
@@ -69,11 +71,13 @@ def build_requirements(
         drawn_edges=drawn_edges,
         light=light,
     )
+    triangulation = _of_pattern(triangulation, wishes.pattern)
     if wishes.robust is not None:
         _check_drawn(table, wishes.robust)
     if wishes.accuracy_mm is not None:
         _check_positive("accuracy_mm", wishes.accuracy_mm)
         triangulation = replace(triangulation, max_sigma_m=wishes.accuracy_mm * 1e-3)
+    coarse = {} if wishes.pattern == "dense" else {"max_sample_distance_m": None}
     checked: dict[str, Any] = {
         key.replace("_mm", "_m"): _si(key, value)
         for key, value in table.check.model_dump().items()
@@ -86,7 +90,7 @@ def build_requirements(
         min_reachable=_share("min_reachable", wishes, shares),
         target=target,
         pattern=wishes.pattern,
-        projector=_limits_of(ProjectorLimits, table.limits, "projector_"),
+        projector=_limits_of(ProjectorLimits, table.limits, "projector_", **coarse),
         camera=_limits_of(CameraLimits, table.limits, "camera_"),
         triangulation=triangulation,
         check=CheckLimits(**checked, tau_m=tau_m),
@@ -94,6 +98,21 @@ def build_requirements(
         region_coverage=_share("region_coverage", wishes, shares, or_none=True),
         region_share=shares.region_share,
         survival=_survival(wishes),
+    )
+
+
+def _of_pattern(limits: TriangulationLimits, pattern: Pattern) -> TriangulationLimits:
+    """Return the limits that a pattern has: angles, or those of rings."""
+    if pattern == "rings":
+        return replace(limits, min_angle=None, max_angle=None)
+    low, high = limits.min_angle, limits.max_angle
+    return replace(
+        limits,
+        min_conditioning=0.0,
+        min_ring_pitch_px=None,
+        ring_sigma_m=None,
+        min_angle=_ANGLES[0] if low is None else low,
+        max_angle=_ANGLES[1] if high is None else high,
     )
 
 

@@ -16,7 +16,6 @@ from planning.model.calibration_errors import (
     CalibrationErrors,
     Mounting,
 )
-from planning.model.document.device_records import RingAxis
 from planning.model.light.photometry_table import PhotometryTable
 from planning.model.light.response_table import Response
 from planning.model.table_types import (
@@ -34,6 +33,7 @@ from planning.model.table_types import (
 
 from .existing_tables import ExistingTable
 from .obstacle_tables import ObstacleTable
+from .pattern_tables import DenseTable, RingsTable
 from .workspace_tables import WorkspaceTable, check_names
 
 # Far beyond any device, and any table of poses and samples that memory holds.
@@ -159,16 +159,6 @@ class PlacementTable(Table):
         return self
 
 
-class RingsTable(Table):
-    """The ring pattern, `[rings]`; without a gap the planner chooses it."""
-
-    tilt_deg: Annotated[float, Field(ge=0.0, lt=45.0)] = 8.0
-    gap_mm: Annotated[float, Field(ge=0.01)] | None = None
-    spacing: Literal["uniform", "curvature"] = "curvature"
-    axis: RingAxis = "auto"
-    margin_mm: Annotated[float, Field(ge=0.0)] = 15.0
-
-
 class LimitsTable(Table):
     """When a point counts as lit, seen and measurable, `[limits]`."""
 
@@ -275,6 +265,7 @@ class RigTable(Table):
     parallel_projector: ParallelTable | None = None
     placement: PlacementTable = PlacementTable()
     rings: RingsTable = RingsTable()
+    dense: DenseTable = DenseTable()
     workspace: WorkspaceTable = WorkspaceTable()
     limits: LimitsTable = LimitsTable()
     calibration: CalibrationTable = CalibrationTable()

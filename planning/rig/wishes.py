@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from planning.model.document.device_records import RingAxis
+from planning.model.document.ring_records import RingAxis
 
 Pattern = Literal["rings", "dense", "none"]
 AccuracyOf = Literal["noise", "total"]

@@ -9,15 +9,21 @@ from planning.model.planned import PlannedCamera, PlannedProjector, code_bits
 _ROUNDING = 1e-9
 
 
-def n_frames(n_rings: Iterable[int], n_cameras: int) -> int:
-    """Return how many frames projectors of so many rings show, one after the other.
+def n_frames(projectors: Iterable[PlannedProjector], n_cameras: int) -> int:
+    """Return how many frames projectors show, one after the other.
 
-    Of each white, black, every bit of the annulus index with its inverse, and for each
-    camera the root disc with its inverse. Cameras record all at once::
+    Of rings white, black, every bit of the annulus index with its inverse, and for each
+    camera the root disc with its inverse; of dense codes what `DenseCode` says. Cameras
+    record all at once::
 
         sum_p (2 + 2 ceil(log2(n_rings + 1)) + 2 n_cameras)
     """
-    return sum(2 + 2 * code_bits(count) + 2 * n_cameras for count in n_rings)
+    return sum(
+        2 + 2 * code_bits(len(one.ring_radii)) + 2 * n_cameras
+        if one.code is None
+        else one.code.n_frames(one.device.resolution)
+        for one in projectors
+    )
 
 
 def pixels_read(
@@ -25,8 +31,7 @@ def pixels_read(
 ) -> int:
     """Return the part of eq. (8) that a plan alone decides: pixels times frames."""
     pixels = sum(math.prod(camera.device.resolution) for camera in cameras)
-    rings = (len(projector.ring_radii) for projector in projectors)
-    return pixels * n_frames(rings, len(cameras))
+    return pixels * n_frames(projectors, len(cameras))
 
 
 def frame_time(

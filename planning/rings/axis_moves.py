@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from geometry.poses import inverse, transform
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.scene.camera_views import view_of
+from planning.scene.codes.patterns import inside_rings
 from planning.scene.draws import DRAWS
 from planning.scene.lights import light_of
 from planning.scene.limits.calibration_terms import calibration_px, surface_deviation
@@ -25,7 +26,6 @@ from planning.scene.measured import (
     pairs_of,
     taken,
 )
-from planning.scene.patterns import inside_rings
 from planning.scene.scene import Scene
 from solvers.poses.axis_problem import PITCH_POWER, AxisProgram
 from solvers.poses.axis_program import better_starts, solve_axis
@@ -208,7 +208,7 @@ def axis_program(
     # A pixel turns a ray by |J| / sqrt 2, whatever the direction, or nearly so.
     per_px = np.maximum(np.linalg.norm(jacobians, axis=(2, 3)), 1e-12) / np.sqrt(2.0)
     turned = calibration_px(errors, distances, per_px) * distances
-    levers = samples.surfaces[p].levers[chosen]
+    levers = samples.surfaces[p].on_average().levers[chosen]
     placed = np.hypot(surface_deviation(errors, levers), limits.ring_sigma_m or 0.0)
     conditioning = max(limits.min_conditioning, _LEAST_CONDITIONING)
     max_sigma, min_pitch = limits.max_sigma_m or np.inf, limits.min_ring_pitch_px or 0.0

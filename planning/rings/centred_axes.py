@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from geometry.mesh.extent import enclosing_ball
 from geometry.poses import inverse, transform
 from planning.model.planned import PlannedProjector
+from planning.scene.codes.patterns import RingPattern
 from planning.scene.draws import DRAWS
 from planning.scene.lights import Light, light_of
 from planning.scene.measured import lit_samples
-from planning.scene.patterns import pattern_of
 from planning.scene.samples import merged
 from planning.scene.scene import Scene
 
@@ -46,7 +46,7 @@ def _centred(
     light, pose = light_of(projector.device), projector.world_from_device
     axis = light.axis_of(_middle(light, transform(inverse(pose), lit)))
     turned = replace(projector, world_from_ring=pose @ light.ring_frame(axis))
-    radii, reach = turned.ring_radii, pattern_of(turned).coordinate(lit).max()
+    radii, reach = turned.ring_radii, RingPattern(turned).coordinate(lit).max()
     count = max(2, int(np.searchsorted(radii, reach + margin)) + 1)
     return replace(turned, ring_radii=radii[:count])
 

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.planned import PlannedProjector
+from planning.scene.codes.patterns import RingPattern
 from planning.scene.lighting import in_panel
-from planning.scene.patterns import pattern_of
 from planning.scene.scene import Scene
 
 from .beam_profile import BeamProfile, cast_beam
@@ -38,7 +38,7 @@ def idle_rings(
     """
     radii = projector.ring_radii
     vertices = scene.mesh.vertices
-    met = pattern_of(projector).coordinate(vertices[in_panel(projector, vertices)])
+    met = RingPattern(projector).coordinate(vertices[in_panel(projector, vertices)])
     rows = profile.coordinates[profile.on_object.any(axis=1)]
     places = np.sort(np.concatenate([rows, met]))
     edges = np.concatenate([[0.0], radii, [2.0 * radii[-1] - radii[-2]]])

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.topology import face_pairs
 from planning.model.planned import PlannedProjector
+from planning.scene.codes.patterns import RingPattern
 from planning.scene.lighting import first_failure, light_on
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.patterns import pattern_of
 from planning.scene.scene import Scene
 
 from .beam_profile import on_faces
@@ -55,7 +55,7 @@ def crease_errors(
     the rings; J is the difference of both faces', h the gap of the rings there [m].
     """
     mesh = scene.mesh
-    rings = pattern_of(projector).surfaces(creases.points)
+    rings = RingPattern(projector).surfaces(creases.points)
     lit = np.ones(len(creases), dtype=bool)
     slopes: list[NDArray[np.float64]] = []
     for side in (0, 1):

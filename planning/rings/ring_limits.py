@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.planned import PlannedProjector
+from planning.scene.codes.patterns import RingPattern
 from planning.scene.lights import light_of
-from planning.scene.patterns import pattern_of
 from planning.scene.scene import Scene
 
 from .beam_profile import BeamProfile, cast_beam
@@ -130,7 +130,7 @@ def _creased(
     degree = 2.0 * np.pi / n_azimuths
     turn = np.arctan2(ring[:, 1], ring[:, 0]) % (2.0 * np.pi)
     column = np.floor(turn / degree).astype(np.int64)
-    row = np.searchsorted(edges, pattern_of(projector).coordinate(creases.points)) - 1
+    row = np.searchsorted(edges, RingPattern(projector).coordinate(creases.points)) - 1
     # Near the axis a short piece of crease is seen under a wide angle.
     half = 0.5 * creases.length
     angle = np.arctan2(half, np.hypot(ring[:, 0], ring[:, 1]))

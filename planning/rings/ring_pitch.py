@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from geometry.poses import inverse
 from planning.model.planned import PlannedProjector
+from planning.scene.codes.patterns import RingPattern
 from planning.scene.lighting import assigned_projectors, lit_margins
 from planning.scene.lights import light_of
 from planning.scene.limits.camera_limits import ViewedSamples
 from planning.scene.measured import LitSamples, lit_samples, pairs_of
-from planning.scene.patterns import pattern_of
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
@@ -113,9 +113,12 @@ def widest_gap(
     lit, the spacing over all samples stands in.
     """
     samples = lit_samples(scene, projectors, target)
-    gaps = [ring.spacing[samples.lit[:, p]] for p, ring in enumerate(samples.surfaces)]
+    gaps = [
+        ring.on_average().spacing[samples.lit[:, p]]
+        for p, ring in enumerate(samples.surfaces)
+    ]
     if not len(samples.target):
         gaps = [
-            pattern_of(p).surfaces(target.samples.points).spacing for p in projectors
+            RingPattern(p).surfaces(target.samples.points).spacing for p in projectors
         ]
     return float(max(gap.max(initial=0.0) for gap in gaps))

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.document.device_records import RingSharesRecord
+from planning.model.document.ring_records import RingSharesRecord
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.scene.measured import LitSamples, measured_by
 from planning.scene.scene import Scene

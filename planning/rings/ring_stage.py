@@ -16,14 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.device_poses import DECIMALS
-from planning.model.document.device_records import CreasesRecord, RingsRecord
+from planning.model.document.ring_records import CreasesRecord, RingsRecord
 from planning.model.planned import PlannedCamera, PlannedProjector, code_bits
 from planning.model.requirements import Requirements
 from planning.scene.camera_views import view_of
+from planning.scene.codes.patterns import RingPattern
 from planning.scene.draws import DRAWS
 from planning.scene.limits.camera_limits import ViewedSamples
 from planning.scene.measured import LitSamples, lit_samples
-from planning.scene.patterns import pattern_of
 from planning.scene.samples import merged
 from planning.scene.scene import Scene
 
@@ -205,7 +205,7 @@ def _binding(
     return [
         np.stack(
             [
-                pattern_of(projector).coordinate(points[user == p]),
+                RingPattern(projector).coordinate(points[user == p]),
                 draw.pitch[user == p, p],
             ]
         )
@@ -214,7 +214,7 @@ def _binding(
 
 
 def _lit_at(beam: RingBeam, samples: LitSamples, p: int) -> NDArray[np.float64]:
-    return pattern_of(beam.projector).coordinate(
+    return RingPattern(beam.projector).coordinate(
         samples.target.samples.points[samples.lit[:, p]]
     )
 
@@ -239,7 +239,7 @@ def rings_record(
     lit, error = crease_errors(scene, final, creases)
     # Rounding decides whether the last row lies inside the last ring.
     shone = beam.profile.points[:-1][beam.profile.lit[:-1]]
-    gaps = pattern_of(final).surfaces(shone).spacing
+    gaps = RingPattern(final).surfaces(shone).spacing
     errors = beam.errors_under(final) > tolerance_m(scene.requirements)
     spaced = "uniform" if final is beam.projector else "curvature"
     return RingsRecord(

@@ -10,7 +10,8 @@ equal code, J_r = dr/d(u, v), v = r x (N x m) and g = J_r^T v::
 
 with s_px = s_0 / (-N.L), and the noise of the light beside it where the rig states that
 (`light_terms`), h the spacing along m, and s_L what blur leaves of the panel's pixels
-(`edge_terms`); s_v and s_m are what errors of the
+(`edge_terms`). Of coded pixels m follows from r (`codes.surfaces`), and beside s_R
+stands the noise of the phase (`code_noise`). s_v and s_m are what errors of the
 calibration move the viewing ray by along v, and the surface of equal code along m
 (`calibration_terms`). `formulation.md`, sections 3 and 8.
 """
@@ -22,9 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.rays.visibility import Visibility
-from planning.model.light.drawn_edges import DrawnEdges
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import CameraLimits, TriangulationLimits
+from planning.scene.codes.surfaces import Coded, CodedPixels, PixelSurfaces
 from planning.scene.limits.calibration_terms import ray_deviation, surface_deviation
 from planning.scene.limits.camera_limits import (
     BLOCKED,
@@ -35,11 +36,10 @@ from planning.scene.limits.camera_limits import (
     CameraRays,
     ViewedSamples,
 )
-from planning.scene.limits.edge_terms import edge_linearity_m, edge_width_px
-from planning.scene.limits.light_terms import GreyLevels, electrons, grey_levels
+from planning.scene.limits.code_noise import code_noise, least_phase_px, together
 from planning.scene.limits.limit import first_violated
-from planning.scene.limits.pair_limits import PAIR_LIMITS, PairQuality, Term
-from planning.scene.patterns import CodeSurfaces
+from planning.scene.limits.pair_limits import PAIR_LIMITS
+from planning.scene.limits.pair_quality import PairQuality, Term
 
 from .placed_bodies import Blocker, first_blocked
 from .samples import LightOnSamples, Target
@@ -86,11 +86,12 @@ def first_between(
 def pair_quality(
     normals: NDArray[np.float64],
     light: LightOnSamples,
-    surfaces: CodeSurfaces,
+    coded: Coded,
     seen: ViewedSamples,
     limits: TriangulationLimits,
 ) -> PairQuality:
     """Return |r.m|, the deviations and pitch of a pair at samples."""
+    surfaces = coded.towards(seen.rays)
     r, m = seen.rays, surfaces.normals
     along = np.einsum("ij,ij->i", r, m)
     v = normals * along[:, None] + m * seen.facing[:, None]
@@ -100,61 +101,35 @@ def pair_quality(
     conditioning, facing = np.abs(along), np.abs(seen.facing)
     per = 1.0 / np.maximum(conditioning, 1e-12)
     reach = seen.distances * g
-    edge = limits.noise_px / np.maximum(light.incidence_cos, 1e-9)
-    drawn = np.full_like(edge, limits.ring_sigma_m or 0.0)
-    terms: dict[Term, NDArray[np.float64]] = {"edges": edge * reach * per}
-    image_px_m = reach / np.maximum(facing, 1e-12)
-    grey = _grey(light, surfaces, seen, image_px_m, limits)
-    if grey is not None:
-        terms["light"] = grey.noise_px * reach * per
-        edge = np.hypot(edge, grey.noise_px)
-    if limits.ring_sigma_m is not None:
-        terms["rings"] = drawn * facing * per
-    if (blurred := limits.drawn_edges) is not None:
-        squares = edge_linearity_m(
-            blurred, surfaces.depths, surfaces.pixel_m, image_px_m
-        )
-        terms["linearity"] = squares * facing * per
-        drawn = np.hypot(drawn, squares)
+    noise = code_noise(light, surfaces, seen, reach / np.maximum(facing, 1e-12), limits)
+    terms: dict[Term, NDArray[np.float64]] = {
+        **{name: part * reach * per for name, part in noise.image_px.items()},
+        **{name: part * facing * per for name, part in noise.surface_m.items()},
+    }
+    edge, drawn = (
+        together(parts, len(g)) for parts in (noise.image_px, noise.surface_m)
+    )
     sigma = np.hypot(edge * reach, drawn * facing) * per
     if (errors := limits.calibration) is not None:
         terms["camera"] = ray_deviation(errors, seen, v, turned) * per
         placed = surface_deviation(errors, surfaces.levers)
         terms["projector"] = placed * facing * per
     pitch = surfaces.spacing * facing / np.maximum(reach, 1e-15)
+    met = surfaces.light_cos if isinstance(surfaces, PixelSurfaces) else None
     quality = PairQuality(
-        *(conditioning, sigma, terms, pitch, seen, light, edge, drawn, grey)
+        *(conditioning, sigma, terms, pitch, seen, light, edge, drawn),
+        grey=noise.grey,
+        light_cos=met,
     )
     if errors is None or limits.accuracy_of == "noise":
         return quality
     return replace(quality, sigma=quality.total)
 
 
-def _grey(
-    light: LightOnSamples,
-    surfaces: CodeSurfaces,
-    seen: ViewedSamples,
-    image_px_m: NDArray[np.float64],
-    limits: TriangulationLimits,
-) -> GreyLevels | None:
-    """How bright samples come out in a camera's image; None: nothing says."""
-    budget = limits.light
-    if budget is None:
-        return None
-    width = edge_width_px(
-        limits.drawn_edges or DrawnEdges(),
-        *(surfaces.depths, surfaces.pixel_m, image_px_m),
-    )
-    off = np.square(seen.off_centre).sum(axis=1) / budget.focal_px**2
-    squarely = surfaces.lux_per_lm * np.maximum(light.incidence_cos, 0.0)
-    lit, dark = electrons(budget, squarely, surfaces.exposure_s)
-    return grey_levels(budget, lit, dark, 1.0 / np.sqrt(1.0 + off), width)
-
-
 def expected_noise_px(
     limits: TriangulationLimits,
     light: LightOnSamples,
-    surfaces: CodeSurfaces,
+    coded: Coded,
     away_m: float,
 ) -> NDArray[np.float64]:
     """Return the noise of edges in a camera that looks squarely at samples [px], (n,).
@@ -162,15 +137,27 @@ def expected_noise_px(
     From so far away, along its axis: for programs, which propose.
     """
     edge = limits.noise_px / np.maximum(light.incidence_cos, 1e-9)
-    if limits.light is None:
+    if limits.light is None or isinstance(coded, CodedPixels):
         return edge
     n = len(edge)
     axis = ViewedSamples(
         np.full(n, SEEN, dtype=np.int8), *np.zeros((3, n)), *np.zeros((2, n, 2))
     )
     image_px_m = np.full(n, away_m / limits.light.focal_px)
-    grey = _grey(light, surfaces, axis, image_px_m, limits)
-    return edge if grey is None else np.hypot(edge, grey.noise_px)
+    return together(code_noise(light, coded, axis, image_px_m, limits).image_px, n)
+
+
+def expected_sigma_m(
+    limits: TriangulationLimits, light: LightOnSamples, coded: Coded
+) -> NDArray[np.float64]:
+    """Return how far surfaces of equal code are off along m on average [m], (n,).
+
+    Beside what the calibration leaves; for programs, which propose.
+    """
+    if not isinstance(coded, CodedPixels):
+        return np.full(len(light.incidence_cos), limits.ring_sigma_m or 0.0)
+    told = least_phase_px(coded.code, limits, light.incidence_cos)
+    return told * coded.on_average().levers[:, 2]
 
 
 def first_pair_failure(

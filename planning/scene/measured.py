@@ -19,10 +19,12 @@ from numpy.typing import NDArray
 from geometry.arrays import rows_of
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import TriangulationLimits
+from planning.scene.codes.patterns import panel_light, pattern_of
+from planning.scene.codes.surfaces import Coded
 from planning.scene.limits.camera_limits import ViewedSamples
-from planning.scene.limits.pair_limits import MEASURED, PairQuality
+from planning.scene.limits.pair_limits import MEASURED
+from planning.scene.limits.pair_quality import PairQuality
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.patterns import CodeSurfaces, pattern_of
 
 from .camera_views import CameraView, camera_views, view_of
 from .lighting import light_on, lit_stages
@@ -45,7 +47,7 @@ class LitSamples:
     target: Target
     lit: NDArray[np.bool_]
     lights: tuple[LightOnSamples, ...]
-    surfaces: tuple[CodeSurfaces, ...]
+    surfaces: tuple[Coded, ...]
 
     @classmethod
     def of(
@@ -77,6 +79,23 @@ def lit_samples(
     lit = lit_stages(scene, projectors, target) == LIT
     chosen = np.flatnonzero(lit.any(axis=1))
     return LitSamples.of(projectors, target.take(chosen), lit[chosen])
+
+
+def widest_pixel(
+    scene: Scene, projectors: Sequence[PlannedProjector], target: Target
+) -> float:
+    """Return the largest pixel of a panel on samples that are lit, in [m].
+
+    ``p(z) / (-N.L)``; where nothing is lit, p(z) over all samples stands in.
+    """
+    lit = lit_stages(scene, projectors, target) == LIT
+    widest = 0.0
+    for p, projector in enumerate(projectors):
+        some = target.take(lit[:, p]) if lit.any() else target
+        _, pixel_m, _ = panel_light(projector, some.samples.points)
+        squarely = light_on(projector, some).incidence_cos if lit.any() else 1.0
+        widest = max(widest, float(np.max(pixel_m / squarely, initial=0.0)))
+    return widest
 
 
 def taken(

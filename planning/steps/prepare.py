@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from geometry.curvature.curvature import CurvatureField, principal_curvatures
 from geometry.curvature.refinement import cut_for_curvature
+from geometry.devices import DeviceModel
 from geometry.mesh.bearing import bearing
 from geometry.mesh.mesh import TriangleMesh
 from geometry.regions.regions import DominantRegions, dominant_regions
@@ -134,18 +135,19 @@ def prepared(request: PlanRequest, clock: Stopwatch) -> Prepared:
         clock.check,
         obstructions=Obstruction.about(mesh, obstacles, request.threads),
     )
+    code = rig.table.dense.code() if requirements.pattern == "dense" else None
     templates = tuple(
         PlannedProjector(
             "",
             rig.light,
             np.eye(4),
-            # Upwards in the image until cameras are known.
-            ring_frame(np.eye(4), model.device, rig.ring_offset, -0.5 * np.pi),
+            np.eye(4) if code else _first_rings(rig, model.device),
             model.device,
             radii,
             body=model.body,
             pattern=requirements.pattern,
             model=model.name,
+            code=code,
         )
         for model in rig.projector_models
     )
@@ -156,6 +158,11 @@ def prepared(request: PlanRequest, clock: Stopwatch) -> Prepared:
     if not request.evaluates:
         check_existing_clearance(scene, templates, cameras)
     return Prepared(request, scene, regions, field.radius, templates, cameras)
+
+
+def _first_rings(rig: Rig, device: DeviceModel) -> NDArray[np.float64]:
+    """A ring frame that leans upwards in the image until cameras are known."""
+    return ring_frame(np.eye(4), device, rig.ring_offset, -0.5 * np.pi)
 
 
 def _regions(request: PlanRequest, field: CurvatureField) -> DominantRegions:
@@ -172,11 +179,17 @@ def _regions(request: PlanRequest, field: CurvatureField) -> DominantRegions:
 
 
 def _resolve(request: PlanRequest) -> tuple[Requirements, NDArray[np.float64]]:
-    """Return the requirements and the ring radii."""
+    """Return the requirements and the ring radii; without rings there are none."""
     mesh, rig = request.mesh, request.rig
     requirements = rig.requirements(
         mesh.centre, mesh.radius, request.wishes, tau_m=rig.standoff_m
     )
+    x, y, z = bearing(mesh, np.array(requirements.workspace.axis)).tolist()
+    if requirements.pattern != "rings":
+        workspace = replace(
+            requirements.workspace, reference_ring_radius=0.0, bearing=(x, y, z)
+        )
+        return replace(requirements, workspace=workspace), np.zeros(0)
     light, offset = light_of(rig.projector_device()), rig.ring_offset
     workspace = requirements.workspace
     gap = rig.ring_gap_m or widest_ring_gap(
@@ -194,7 +207,6 @@ def _resolve(request: PlanRequest) -> tuple[Requirements, NDArray[np.float64]]:
         # One outermost ring for all, no narrower than rings that stay.
         outer = max((outer, *kept.ring_radii[-1:]))
     radii = uniform_radii(outer, light.ring_step(gap, rig.standoff_m))
-    x, y, z = bearing(mesh, np.array(workspace.axis)).tolist()
     workspace = replace(
         workspace, reference_ring_radius=float(radii[-1]), bearing=(x, y, z)
     )

@@ -3,31 +3,28 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from planning.cameras.axis_choice import other_axes, place_for_axes, standing_axes
+from planning.cameras.axis_choice import other_axes, place_for_axes
 from planning.cameras.baselines.widest_baselines import WidestBaselines
 from planning.cameras.camera_cover import (
-    CameraCover,
     NothingMeasuredError,
     camera_candidate_views,
-    candidate_cover,
-    measured_of,
 )
-from planning.cameras.camera_routes import cheapest, widest_routes
+from planning.cameras.camera_routes import Widened, cheapest, widest_routes
 from planning.cameras.camera_stage import CameraSolution, follow_cameras
 from planning.cameras.kept_pairs import rings_for_pairs
 from planning.cameras.proved_cameras import CameraStage, bound_stage
 from planning.model.document.certificates import Certificate
-from planning.model.document.device_records import RingAxis
+from planning.model.document.ring_records import RingAxis
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
-from planning.projectors.candidate_set import CandidateSet, NothingLitError
+from planning.projectors.candidate_set import NothingLitError
 from planning.projectors.exposures import with_exposures
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import ProjectorStage, plan_projectors
 from planning.projectors.proved_projectors import prove_fewest
 from planning.proofs import camera_bound, projector_bound
-from planning.proofs.candidate_certificate import larger, unproved, unsought
+from planning.proofs.candidate_certificate import larger
 from planning.report.advice.camera_relaxations import nothing_measured
 from planning.report.advice.projector_relaxations import nothing_lit
 from planning.report.advice.standing_inside import standing_inside
@@ -35,10 +32,6 @@ from planning.report.advice.what_helps import falls_short
 from planning.report.partial_plan import PartialPlan, Prepared
 from planning.report.region_claims import below_floor
 from planning.rings.acquisition import pixels_read
-from planning.rings.ring_stage import space_rings
-from planning.scene.draws import DRAWS
-
-from .prepare import offered
 
 
 def first_projectors(ready: Prepared, clock: Stopwatch) -> ProjectorStage:
@@ -131,10 +124,9 @@ def placed(
 def _say_count(
     stage: ProjectorStage | CameraStage, devices: Sequence[object], clock: Stopwatch
 ) -> None:
-    clock.say(
-        f"  {len(devices)} of {len(stage.reference)} candidates; at least "
-        f"{stage.certificate.candidates.lower_bound} are needed"
-    )
+    bound = stage.certificate.candidates.lower_bound
+    words = f"{len(devices)} of {len(stage.reference)} candidates"
+    clock.say(f"  {words}; at least {bound} are needed")
 
 
 def polished(partial: PartialPlan, clock: Stopwatch) -> PartialPlan:
@@ -147,17 +139,15 @@ def polished(partial: PartialPlan, clock: Stopwatch) -> PartialPlan:
             partial.camera_stage,
             spare_field=0.0 if ranges is None else ranges[1].angle_rad,
         )
+    if partial.request.ring_axis is None:
+        return _best_unringed(partial, every, clock)
     with clock.stage("rings", "rings: axes and radii for the surface and the cameras"):
         ringed = [_with_rings(partial, stage, moved) for stage, moved in every]
         costs = [pixels_read(one.final_projectors, one.cameras) for one in ringed]
         stages = [one.camera_stage for one in ringed]
         best, stage = cheapest(tuple(zip(stages, costs, strict=True)))
         partial, moved = replace(ringed[best], camera_stage=stage), every[best][1]
-        if moved.smallest_before_m is not None and moved.smallest_after_m is not None:
-            clock.say(
-                f"  smallest baseline {1e3 * moved.smallest_before_m:.0f} -> "
-                f"{1e3 * moved.smallest_after_m:.0f} mm"
-            )
+        _say_baselines(moved, clock)
         if partial.request.ring_axis != "auto":
             return partial
         others = other_axes(
@@ -168,6 +158,23 @@ def polished(partial: PartialPlan, clock: Stopwatch) -> PartialPlan:
             partial.request.ring_margin,
         )
         return replace(partial, other_axes=others)
+
+
+def _best_unringed(
+    partial: PartialPlan, every: Sequence[Widened], clock: Stopwatch
+) -> PartialPlan:
+    """Cameras as they moved, of the route whose scan is cheaper."""
+    costs = [pixels_read(partial.projectors, moved.cameras) for _, moved in every]
+    stages = [stage for stage, _ in every]
+    best, stage = cheapest(tuple(zip(stages, costs, strict=True)))
+    _say_baselines(every[best][1], clock)
+    return replace(partial, camera_stage=stage, cameras=every[best][1].cameras)
+
+
+def _say_baselines(moved: WidestBaselines, clock: Stopwatch) -> None:
+    before, after = moved.smallest_before_m, moved.smallest_after_m
+    if before is not None and after is not None:
+        clock.say(f"  smallest baseline {1e3 * before:.0f} -> {1e3 * after:.0f} mm")
 
 
 def _with_rings(
@@ -278,40 +285,3 @@ def one_device_more(
 def _bound_words(proof: Certificate) -> str:
     bound = proof.continuous
     return "" if bound is None else f"at least {bound.lower_bound}, {bound.proof}"
-
-
-def as_they_stand(ready: Prepared, clock: Stopwatch) -> PartialPlan:
-    """Return the existing devices with their rings, and what candidates would reach."""
-    request, scene = ready.request, ready.scene
-    with clock.stage("projectors", "projectors: what they light as they stand"):
-        poses, views = offered(ready)
-        samples = scene.target_samples(DRAWS.projectors)
-        candidates = CandidateSet.over(scene, samples, poses)
-        projectors = candidates.projectors[: candidates.n_existing]
-        projectors = with_exposures(scene, projectors)
-        proof = unproved(candidates.cover, candidates.samples.samples.weight)
-        stage = ProjectorStage(
-            {len(projectors): projectors}, proof, projectors, candidates
-        )
-    with clock.stage("cameras", "cameras: what they measure as they stand"):
-        cameras = views.cameras[: len(scene.requirements.existing_of("camera"))]
-        target = scene.target_samples(DRAWS.cameras)
-        asked, margin = request.ring_axis, request.ring_margin
-        projectors, axes = standing_axes(
-            scene, projectors, views, target, axis=asked, margin=margin
-        )
-        samples, measured = measured_of(scene, projectors, views, target)
-        cover = candidate_cover(scene, measured, samples, views.cameras)
-        proof = unproved(cover, target.samples.weight)
-        camera_stage = CameraStage(
-            {len(cameras): cameras},
-            proof,
-            cameras,
-            CameraCover(views, samples, measured, unsought(cover)),
-        )
-    with clock.stage("rings", "rings: radii for the surface and the cameras"):
-        spacing = request.rig.rings.spacing
-        rings = space_rings(scene, projectors, cameras, spacing, samples, margin=margin)
-    return PartialPlan(
-        ready, stage, projectors, camera_stage, cameras, axes=axes, rings=rings
-    )

@@ -23,10 +23,10 @@ from planning.cameras.baselines.widest_baselines import BaselineSearch
 from planning.model.bodies import Box
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import TriangulationLimits
+from planning.scene.codes.surfaces import CodeSurfaces
 from planning.scene.limits.camera_limits import ViewedSamples
 from planning.scene.limits.pair_limits import MEASURED
 from planning.scene.measurability import first_pair_failure, pair_quality
-from planning.scene.patterns import CodeSurfaces
 
 THETA = np.radians(60.0)
 RADIUS, RING = 0.1, 1.0
@@ -303,7 +303,7 @@ def test_what_rings_ask_is_what_measurability_says():
     measured = np.zeros((len(rows), 2), dtype=bool)
     for k in range(2):
         incidence = SimpleNamespace(incidence_cos=light[k, rows])
-        drawn = CodeSurfaces(ring[k, rows], spacing[k, rows], 0.0 * r, t, t, t, t)
+        drawn = CodeSurfaces(t, t, t, t, ring[k, rows], spacing[k, rows], 0.0 * r)
         quality = pair_quality(normal, incidence, drawn, view, asked)
         measured[:, k] = first_pair_failure(quality, asked) == MEASURED
         measured[:, k] &= lit[rows, k]

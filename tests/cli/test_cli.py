@@ -238,7 +238,7 @@ def test_a_signal_while_a_plan_is_saved_costs_no_second_saving(
         (["--mesh", "FACE"], 2, "--max-projectors"),
         (["--mesh", "FACE", "--max-projectors", 3, "--nope"], 2, "--nope"),
         (
-            ["--mesh", "FACE", "--max-projectors", 3, "--pattern", "dense"],
+            ["--mesh", "FACE", "--max-projectors", 3, "--pattern", "none"],
             2,
             "isn't built yet",
         ),

@@ -20,9 +20,9 @@ from geometry.shapes.primitives import sphere
 from planning import pipeline
 from planning.report.assemble import write_plan
 from planning.rig.rig import load_rig
+from planning.scene.codes.patterns import RingPattern
 from planning.scene.draws import Draw
 from planning.scene.measured import lit_samples, measured_by
-from planning.scene.patterns import RingPattern
 from planning.verify.audit.audit import audit_plan
 
 RIG = """

@@ -28,15 +28,15 @@ from planning.model.document.certificates import (
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs import all_poses, camera_bound
 from planning.proofs.camera_bound import DEFAULT, PROVE, bound_cameras, camera_trees
-from planning.proofs.cells import measurable_cells
+from planning.proofs.cells import crossings
 from planning.proofs.cells.image_cone import image_cone
 from planning.proofs.cells.measurable_cells import MeasurableCells
 from planning.rig.rig import load_rig
+from planning.scene.codes.surfaces import CodeSurfaces
 from planning.scene.draws import Draw
 from planning.scene.lights import ring_frame
 from planning.scene.limits import pair_limits
 from planning.scene.measured import LitSamples, lit_samples
-from planning.scene.patterns import CodeSurfaces
 from planning.scene.samples import LightOnSamples
 from planning.scene.workspace.candidates import aimed_poses
 from solvers.cells.cell_bound import CellStatus
@@ -96,7 +96,7 @@ def everything_lit(scene, n):
         target,
         lit,
         (light,),
-        (CodeSurfaces(across, 0.01 * one, np.zeros((len(one), 3)), *[one] * 4),),
+        (CodeSurfaces(*[one] * 4, across, 0.01 * one, np.zeros((len(one), 3))),),
     )
 
 
@@ -263,10 +263,11 @@ def test_over_a_cone_the_largest_cosine_and_the_least_sine_to_a_line():
     """cos(max(0, a - psi)) of a direction at a, and sin(max(0, a - psi)) to a line."""
     a = np.radians(np.linspace(0.0, 180.0, 61))[:, None]
     psi = np.radians(np.linspace(0.0, 180.0, 61))[None, :]
-    nearest = measurable_cells._nearest(np.cos(a), np.cos(psi), np.sin(psi))
+    cone = crossings.Cone(a, psi, np.cos(psi), np.sin(psi))
+    nearest = crossings.nearest_cos(np.cos(a), cone)
     np.testing.assert_allclose(nearest, np.cos(np.maximum(a - psi, 0)), atol=1e-7)
     line = np.arccos(np.abs(np.cos(a)))
-    sine = measurable_cells._least_sine(np.cos(line), np.cos(psi), np.sin(psi))
+    sine = crossings._least_sine(np.cos(line), cone)
     np.testing.assert_allclose(sine, np.sin(np.maximum(line - psi, 0)), atol=1e-7)
 
 
@@ -321,7 +322,7 @@ def test_what_any_place_and_aim_measures_is_admitted(limit, value, off, name):
     rows = replace(
         rows,
         lights=(light,),
-        surfaces=(CodeSurfaces(m, spacing, levers, *[cosine] * 4),),
+        surfaces=(CodeSurfaces(*[cosine] * 4, m, spacing, levers),),
     )
     limits = FREE | {limit: value, "calibration": off}
     required = scene_of(sphere(0.1), limits=limits).requirements

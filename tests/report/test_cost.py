@@ -5,13 +5,12 @@ import pytest
 
 from geometry.devices import PinholeModel
 from planning.model.document.device_records import (
-    CreasesRecord,
     ProjectorRecord,
-    RingsRecord,
     camera_record,
     projector_record,
 )
 from planning.model.document.input_records import RigRecord
+from planning.model.document.ring_records import CreasesRecord, RingsRecord
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.report.entries.cost_entry import cost_record
 from planning.report.summary.check_lines import cost_lines
@@ -82,7 +81,7 @@ def test_frames_are_those_that_the_patterns_have(n_rings, n_cameras):
     one = projector(n_rings)
     drawn = DrawnRings(LIGHTS["diverging"], one.ring_radii)
     ids = [f"C{c}" for c in range(n_cameras)]
-    assert n_frames([n_rings] * 2, n_cameras) == 2 * len(drawn.frames(ids))
+    assert n_frames([one] * 2, n_cameras) == 2 * len(drawn.frames(ids))
 
 
 @pytest.mark.parametrize(

@@ -596,8 +596,15 @@ def test_limits_can_be_switched_off(write):
     assert asked.triangulation.min_ring_pitch_px is None
     assert asked.camera.max_sample_distance_m == pytest.approx(5e-4)
     assert asked.triangulation.ring_sigma_m == pytest.approx(2e-5)
+    # Angles are of coded pixels, whose rays the projector samples, too.
+    assert asked.triangulation.min_angle is None
+    assert asked.projector.max_sample_distance_m is None
+    asked = require(rig, pattern="dense")
     assert asked.triangulation.min_angle == pytest.approx(np.deg2rad(5.0))
     assert asked.triangulation.max_angle == pytest.approx(np.deg2rad(60.0))
+    assert asked.projector.max_sample_distance_m == pytest.approx(5e-4)
+    assert asked.triangulation.ring_sigma_m is None
+    assert asked.triangulation.min_conditioning == 0.0
 
 
 @pytest.mark.parametrize(

@@ -25,10 +25,10 @@ from planning.rings.ring_radii import uniform_radii
 from planning.rings.ring_shares import ring_shares
 from planning.rings.ring_stage import space_rings
 from planning.scene import measurability
+from planning.scene.codes.patterns import pattern_of
 from planning.scene.draws import Draw
 from planning.scene.lights import ring_frame
 from planning.scene.measured import lit_samples, measured_by
-from planning.scene.patterns import pattern_of
 
 RADIUS = 0.1
 AWAY = 1.1

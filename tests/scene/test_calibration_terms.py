@@ -12,7 +12,7 @@ from planning.model.calibration_errors import PERFECT, CalibrationErrors
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import CameraLimits, TriangulationLimits
 from planning.scene import lighting, measurability
-from planning.scene.patterns import pattern_of
+from planning.scene.codes.patterns import pattern_of
 from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.predicates.audit_devices import AuditCamera, AuditProjector
 from planning.verify.audit.predicates.error_terms import PairGeometry, error_terms

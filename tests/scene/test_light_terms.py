@@ -14,10 +14,14 @@ from geometry.poses import look_at
 from planning.model.light.light_budget import SATURATED, LightBudget
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.scene import measurability
-from planning.scene.limits.light_terms import electrons, grey_levels
+from planning.scene.codes.patterns import panel_light
+from planning.scene.limits.light_terms import (
+    edge_noise_px,
+    electrons,
+    grey_levels,
+)
 from planning.scene.limits.limit import RigFacts
 from planning.scene.limits.pair_limits import CAUSES, Clipped, TooDark
-from planning.scene.patterns import panel_light
 from planning.verify.audit.predicates.audit_devices import AuditCamera, AuditProjector
 from planning.verify.audit.predicates.light_levels import LightLevels
 
@@ -79,9 +83,9 @@ def test_electrons_are_those_of_a_radiometers_arithmetic():
     assert dark[0] == pytest.approx(lit[0] / 400.0)
 
 
-def _greys(light, lux=0.1, time=0.01, width=1.5):
+def _greys(light, lux=0.1, time=0.01):
     lit, dark = electrons(light, np.array([lux]), time)
-    return grey_levels(light, lit, dark, np.ones(1), np.array([width]))
+    return grey_levels(light, lit, dark, np.ones(1))
 
 
 def test_twice_the_stop_is_a_quarter_and_twice_the_time_twice():
@@ -93,17 +97,17 @@ def test_twice_the_stop_is_a_quarter_and_twice_the_time_twice():
     )
     # The brightest counts where it clips, the darkest where it must be told apart.
     assert one.contrast == pytest.approx(0.5 * one.white * (1.0 - 1.0 / 400.0))
-    off = grey_levels(LIGHT, *electrons(LIGHT, np.array([0.1]), 0.01), 0.9, 1.5)
+    off = grey_levels(LIGHT, *electrons(LIGHT, np.array([0.1]), 0.01), 0.9)
     assert off.white == pytest.approx(0.9**4 * one.white)
 
 
 def test_noise_falls_with_the_root_of_the_light_where_photons_make_it():
     quiet = replace(LIGHT, read_noise_e=0.0, bits=16)
-    ratio = _greys(quiet).noise_px / _greys(quiet, time=0.04).noise_px
+    ratio = _greys(quiet).noise / _greys(quiet, time=0.04).noise
     assert ratio == pytest.approx(2.0, rel=1e-3)
     # And with the light itself where the sensor's own noise does.
     loud = replace(LIGHT, read_noise_e=1e4)
-    ratio = _greys(loud).noise_px / _greys(loud, time=0.04).noise_px
+    ratio = _greys(loud).noise / _greys(loud, time=0.04).noise
     assert ratio == pytest.approx(4.0, rel=1e-3)
 
 
@@ -111,7 +115,7 @@ def test_room_light_adds_noise_and_no_signal():
     bright = replace(LIGHT, room_lux=200.0)
     assert _greys(bright).contrast == pytest.approx(_greys(LIGHT).contrast)
     assert _greys(bright).white > 2.9 * _greys(LIGHT).white
-    assert _greys(bright).noise_px > 1.5 * _greys(LIGHT).noise_px
+    assert _greys(bright).noise > 1.5 * _greys(LIGHT).noise
 
 
 def test_edges_drawn_with_that_noise_are_found_with_that_deviation():
@@ -135,7 +139,7 @@ def test_edges_drawn_with_that_noise_are_found_with_that_deviation():
     found = at[after] - beyond / (beyond - before)
     middle = (after > 4) & (after < 9)
     spread = np.std((found - off)[middle])
-    predicted = _greys(LIGHT, lux=0.4, width=width).noise_px[0]
+    predicted = edge_noise_px(_greys(LIGHT, lux=0.4), np.array([width]))[0]
     assert spread == pytest.approx(predicted, rel=0.04)
 
 
@@ -173,10 +177,10 @@ def test_the_audit_finds_the_same_greys(device, light):
     local = (points - pose[:3, 3]) @ pose[:3, :3]
     axis = local[:, 2] / np.linalg.norm(local, axis=1)
     width = np.array([1.0, 2.0])
-    greys = grey_levels(shone, *electrons(shone, lux * facing, 0.02), axis, width)
+    greys = grey_levels(shone, *electrons(shone, lux * facing, 0.02), axis)
     assert levels.brightest == pytest.approx(greys.white)
     assert levels.contrast == pytest.approx(greys.contrast)
-    assert levels.noise_px(width) == pytest.approx(greys.noise_px)
+    assert levels.noise_px(width) == pytest.approx(edge_noise_px(greys, width))
 
 
 def _seen(light, lumens):

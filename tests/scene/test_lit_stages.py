@@ -17,11 +17,11 @@ from planning.report.reach import furthest_lit
 from planning.rig.rig import load_rig
 from planning.rings.ring_radii import uniform_radii
 from planning.scene import lighting
+from planning.scene.codes.patterns import pattern_of
 from planning.scene.draws import Draw
 from planning.scene.lighting import light_on, lit_stages
 from planning.scene.lights import ring_frame
 from planning.scene.limits import projector_limits
-from planning.scene.patterns import pattern_of
 from planning.scene.samples import Target
 from planning.scene.workspace.candidates import Candidates
 

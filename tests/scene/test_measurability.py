@@ -10,8 +10,8 @@ from geometry.poses import inverse, look_at, transform
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import CameraLimits, TriangulationLimits
 from planning.scene import lighting, measurability
+from planning.scene.codes.patterns import pattern_of
 from planning.scene.limits import camera_limits, pair_limits
-from planning.scene.patterns import pattern_of
 from planning.scene.samples import Target
 
 UP = np.array([0.0, 0.0, 1.0])

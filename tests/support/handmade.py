@@ -27,6 +27,7 @@ LIGHT = (
     "projector_range",
     "projector_incidence",
     "tangent_angle",
+    "pixel_distance",
     "projector_occlusion",
     "projector_body",
     "blocked_by_obstacle",
@@ -40,8 +41,8 @@ SIGHT = (
     "blocked_by_obstacle",
     "sample_distance",
 )
-PAIR = ("too_dark", "clipped", "conditioning", "sigma", "pitch")
-MEASURED = len(SIGHT) + len(PAIR)
+PAIR = ("too_dark", "clipped", "conditioning", "angle", "sigma", "pitch")
+LIT, MEASURED = len(LIGHT), len(SIGHT) + len(PAIR)
 RADIUS_M = 0.05
 UP = np.array([0.0, 1.0, 0.0])
 # Sign of a cone's normal along the axis of the rings; +1 is the error to be found.
@@ -422,7 +423,7 @@ def _evaluate(
     steps = [
         light_steps(entry, p, n, steep, limits["projector"]) for entry in projectors
     ]
-    lit = [s == 7 for s in steps]
+    lit = [s == LIT for s in steps]
     pairs = [
         [pair_steps(projector, camera, p, n, limits) for camera in cameras]
         for projector, on in zip(projectors, lit, strict=True)
@@ -446,7 +447,7 @@ def _evaluate(
     return {
         "falls": [
             light_steps({**entry, "range_m": [0.0, 99.0]}, p, n, [0.0] * 3, any_light)
-            == 7
+            == LIT
             for entry in projectors
         ],
         "lit": any(lit),
@@ -455,10 +456,10 @@ def _evaluate(
         "measured": measured,
         "margins": margins,
         "server": margins.index(max(margins)) if any(lit) else None,
-        "by_projectors": reference == 7,
+        "by_projectors": reference == LIT,
         "by_cameras": any(lit) and sight == MEASURED,
         "uncovered_by_cause": cause,
-        "unreachable_by_cause": None if reference == 7 else LIGHT[reference],
+        "unreachable_by_cause": None if reference == LIT else LIGHT[reference],
         "unmeasurable_by_cause": None if sight == MEASURED else (SIGHT + PAIR)[sight],
         "inside": inside,
     }
@@ -509,7 +510,7 @@ def _reference_sight(
 
 
 def light_steps(entry: Any, p: Any, n: Any, steep: Any, limits: Any) -> int:
-    """Limits of *lit* that a point on a convex body passes, 7: lit."""
+    """Limits of *lit* that a point on a convex body passes, `LIT`: lit."""
     local = _into(entry["world_from_device"], p)
     ring = _into(entry["world_from_ring"], p)
     last = entry["ring_radii"][-1]
@@ -536,7 +537,7 @@ def light_steps(entry: Any, p: Any, n: Any, steep: Any, limits: Any) -> int:
         return 2
     if not abs(_dot(steep, along)) <= math.cos(limits["min_tangent_angle"]):
         return 3
-    return 7
+    return LIT
 
 
 def light(entry: Any, p: Any) -> tuple[list[float], float]:
@@ -609,8 +610,8 @@ def _triangulation_steps(
         noise * t * g / conditioning, asked["ring_sigma_m"] * squarely / conditioning
     )
     if not sigma <= asked["max_sigma_m"]:
-        return 1
-    return 3 if spacing * squarely / (t * g) >= asked["min_ring_pitch_px"] else 2
+        return 2
+    return 4 if spacing * squarely / (t * g) >= asked["min_ring_pitch_px"] else 3
 
 
 def project(camera: Any, local: Any) -> tuple[float, float]:

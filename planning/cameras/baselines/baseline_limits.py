@@ -53,6 +53,8 @@ class RingsOnSurface:
         lit: Whether a projector lights a sample, shape (n, n_p).
         placed: Standard deviation of the ring surfaces along m [m], shape (n_p, n);
             0: as drawn.
+        turning: Whether `normals` are instead the directions of the light on coded
+            pixels, where m is that part of a ray across it.
     """
 
     normals: _Array
@@ -60,6 +62,16 @@ class RingsOnSurface:
     noise_px: _Array
     lit: NDArray[np.bool_]
     placed: _Array | float = 0.0
+    turning: bool = False
+
+    def across(self, samples: NDArray[np.int64], rays: _Array) -> _Array:
+        """Return m of the surfaces by which rays (q, 3) measure them, (n_p, q, 3)."""
+        normals = self.normals[:, samples]
+        if not self.turning:
+            return normals
+        along = np.einsum("ij,pij->pi", rays, normals)
+        m = rays - along[..., None] * normals
+        return m / np.maximum(np.linalg.norm(m, axis=2), 1e-12)[..., None]
 
 
 def best_rings(
@@ -84,7 +96,7 @@ def best_rings(
     ray = surface.points[samples] - pose[:3, 3]
     distance = np.linalg.norm(ray, axis=1)
     r, normal = ray / distance[:, None], surface.normals[samples]
-    m = rings.normals[:, samples]
+    m = rings.across(samples, r)
     along = np.einsum("ij,pij->pi", r, m)
     facing = -np.einsum("ij,ij->i", r, normal)
     v = normal * along[..., None] + m * facing[:, None]

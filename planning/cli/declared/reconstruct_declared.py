@@ -10,10 +10,13 @@ from planning.cli.console import (
     PlanFile,
     Positive,
     output_options,
+    panel_size,
     run,
     signed_limits,
     threads_option,
 )
+
+_DENSE_ONLY = ("projector_size", "code_step", "unit")
 
 
 @click.command()
@@ -82,7 +85,30 @@ from planning.cli.console import (
     type=click.Path(path_type=Path),
     metavar="FOLDER",
     help="Read images that cameras took, FOLDER/C1/P1/00-white.png and so on, instead "
-    "of simulating them.",
+    "of simulating them; with --dense those of one camera, FOLDER/*.png.",
+)
+@click.option(
+    "--dense",
+    is_flag=True,
+    help="Instead of a plan: images of OpenCV's Gray code by one camera and one "
+    "projector, --calibration being OpenCV's of both.",
+)
+@click.option(
+    "--projector-size",
+    callback=panel_size,
+    metavar="WIDTHxHEIGHT",
+    help="With --dense: pixels that were coded [default: 1024x768].",
+)
+@click.option(
+    "--code-step",
+    type=click.IntRange(1, 64),
+    metavar="N",
+    help="With --dense: pixels of the projector for one of the code [default: 1].",
+)
+@click.option(
+    "--unit",
+    type=click.Choice(["mm", "cm", "m", "in", "um"]),
+    help="With --dense: of the calibration's translation, and the cloud [default: mm].",
 )
 @click.option(
     "--save-captures",
@@ -93,8 +119,9 @@ from planning.cli.console import (
 @click.option(
     "--calibration",
     type=click.Path(path_type=Path),
-    metavar="FILE.json",
-    help="Poses and optics as measured after mounting [default: the plan's].",
+    metavar="FILE",
+    help="Poses and optics as measured after mounting [default: the plan's]; with "
+    "--dense OpenCV's FileStorage, XML or YAML.",
 )
 @click.option(
     "--refine",
@@ -133,6 +160,10 @@ def reconstruct(**options: Any) -> None:  # noqa: ANN401
         from planning.cli.experiment_command import experiment_command
 
         run(lambda: experiment_command(options), debug=options["debug"])
+    if options["dense"]:
+        from planning.cli.devices.gray_command import gray_command
+
+        run(lambda: gray_command(options), debug=options["debug"])
     from planning.cli.reconstruct_command import reconstruct_command
 
     if options["captures"] is not None and options["save_captures"] is not None:
@@ -148,8 +179,27 @@ def _is_set(options: dict[str, Any], name: str) -> bool:
     return options[name] is not None and options[name] is not False
 
 
+def _check_dense(options: dict[str, Any]) -> None:
+    if options["captures"] is None or options["calibration"] is None:
+        raise click.UsageError("--dense goes with --captures FOLDER --calibration FILE")
+    known = {"dense", "captures", "calibration", "output", *_DENSE_ONLY}
+    known |= {"debug", "quiet", "as_json", "threads"}
+    for name in options:
+        if name not in known and _is_set(options, name):
+            what = "a plan" if name == "plan_file" else f"--{name.replace('_', '-')}"
+            raise click.UsageError(
+                f"give --dense or {what}, not both: with it nothing is planned, "
+                f"simulated or judged"
+            )
+
+
 def _check_reconstruct(options: dict[str, Any]) -> None:
     experiment = options["experiment"] is not None
+    if options["dense"]:
+        return _check_dense(options)
+    for name in _DENSE_ONLY:
+        if _is_set(options, name):
+            raise click.UsageError(f"--{name.replace('_', '-')} goes with --dense")
     if experiment == (options["plan_file"] is not None):
         raise click.UsageError("give DIR/plan.json, or --experiment box or face")
     if not options["single_shot"] and options["prior_mm"] is not None:

@@ -18,7 +18,7 @@ from .coverage_records import (
     RegionRecord,
     RobustRecord,
 )
-from .device_records import BaselineRow, CameraRecord, ProjectorRecord, RingAxes
+from .device_records import BaselineRow, CameraRecord, ProjectorRecord
 from .input_records import (
     EvaluationRecord,
     MeshRecord,
@@ -28,6 +28,7 @@ from .input_records import (
     Units,
 )
 from .part import Part
+from .ring_records import RingAxes
 from .survival_records import SurvivalRecord
 
 FORMAT = "ringrig-plan"

@@ -1,6 +1,7 @@
 """What a projector shows that codes every pixel: Gray code, then phase shifts."""
 
 from dataclasses import dataclass
+from math import radians
 
 # Periods and stripes are whole powers of two, so that they begin together.
 _FEWEST_SHIFTS = 3
@@ -28,7 +29,7 @@ class DenseCode:
 
     shifts: int = 4
     period_px: int = 16
-    phase_noise: float = 0.02
+    phase_noise: float = radians(1.0)
 
     def __post_init__(self) -> None:
         """Check the numbers.

@@ -13,25 +13,26 @@ image's bounds on |g| / |v| and on z / t (`image_cone`)::
     pitch   <= h |N.r| / ((t_c - e) |g|)                    must reach min_ring_pitch
     z       >= (t_c - e) cos(off axis),  z / (f |N.r|)      must not exceed the limit
 
-A sample stays if that holds for some projector that lights it, and some model of the
-cameras. Bodies of devices are left out. The symbols and limits are those of
-`measurability`.
+Of coded pixels m turns with r (`crossings`). A sample stays if that holds for some
+projector that lights it, and some model of the cameras. Bodies of devices are left out.
+The symbols and limits are those of `measurability`.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
 from planning.model.requirements import Requirements
-from planning.scene.limits.calibration_terms import surface_deviation
+from planning.scene.codes.surfaces import CodedPixels
 from planning.scene.limits.camera_limits import CAMERA_LIMITS, CellView
 from planning.scene.limits.limit import may_hold
-from planning.scene.limits.pair_limits import PAIR_LIMITS, PairCell
+from planning.scene.limits.pair_limits import PAIR_LIMITS
 from planning.scene.measured import LitSamples
 
+from .crossings import Cone, PixelCrossings, RingCrossings, dot, nearest_cos
 from .image_cone import ImageCone, image_cone
 
 _Array = NDArray[np.float64]
@@ -59,10 +60,7 @@ class MeasurableCells:
     ) -> None:
         self._check_cancelled = check_cancelled
         self._camera, self._pair = required.camera, required.triangulation
-        normals = samples.target.samples.normals
-        self._normals, self._lit = normals, samples.lit
-        self._across = np.stack([ring.normals for ring in samples.surfaces])
-        self._spacing = np.stack([ring.spacing for ring in samples.surfaces])
+        self._normals, self._lit = samples.target.samples.normals, samples.lit
         cosines = np.stack([light.incidence_cos for light in samples.lights])
         errors = self._pair.limited_calibration
         edge = self._pair.noise_px / np.maximum(cosines, 1e-9)
@@ -73,13 +71,13 @@ class MeasurableCells:
             turned = errors.about_axis / image.least_turn
             noise = np.sqrt(edge**2 + turned**2 + errors.along_line_px**2)
             self._lenses.append(_Lens(image, device.focal_px, noise))
-        levers = np.stack([ring.levers for ring in samples.surfaces])
-        placed = surface_deviation(errors, levers)
         squarely = np.cos(self._camera.max_incidence)
-        self._placed = np.hypot(placed, self._pair.ring_sigma_m or 0.0) * squarely
-        along = np.cross(normals, self._across)
-        self._width = np.linalg.norm(along, axis=2)
-        self._along = along / np.where(self._width > 0.0, self._width, 1.0)[..., None]
+        self._crossings: list[RingCrossings | PixelCrossings] = [
+            PixelCrossings(self._normals, coded, self._pair, cosine, squarely)
+            if isinstance(coded, CodedPixels)
+            else RingCrossings(self._normals, coded, self._pair, squarely)
+            for coded, cosine in zip(samples.surfaces, cosines, strict=True)
+        ]
 
     def admits(
         self,
@@ -97,37 +95,18 @@ class MeasurableCells:
             psi: Angle about `towards` that holds the cell [rad], shape (k,).
         """
         self._check_cancelled()
-        cosine, sine = np.cos(psi), np.sin(psi)
-        facing = _nearest(_dot(self._normals[samples], towards), cosine, sine)
+        cone = Cone.of(towards, psi)
+        facing = nearest_cos(dot(self._normals[samples], towards), cone)
         admitted = np.zeros(samples.size, dtype=bool)
         for lens in self._lenses:
             depth = nearest * np.cos(lens.image.off_axis)
             cell = CellView(facing, depth, lens.focal_px)
             seen = may_hold(CAMERA_LIMITS, cell, self._camera, len(samples))
-            for p in range(self._lit.shape[1]):
+            turn = nearest * lens.image.least_turn
+            for p, crossing in enumerate(self._crossings):
                 at = np.flatnonzero(self._lit[samples, p] & seen & ~admitted)
-                k, u, c, s = samples[at], towards[at], cosine[at], sine[at]
-                crossing = _nearest(np.abs(_dot(self._across[p, k], u)), c, s)
-                turn = _least_sine(np.abs(_dot(self._along[p, k], u)), c, s)
-                g = nearest[at] * lens.image.least_turn * self._width[p, k] * turn
-                noise, spacing = lens.noise_px[p, k], self._spacing[p, k]
-                placed = self._placed[p, k]
-                pair = PairCell(crossing, facing[at], g, noise, spacing, placed)
+                k = samples[at]
+                pair = crossing.best(k, cone.take(at), facing[at], turn[at])
+                pair = replace(pair, noise=lens.noise_px[p, k])
                 admitted[at] = may_hold(PAIR_LIMITS, pair, self._pair, len(k))
         return admitted
-
-
-def _nearest(c: _Array, cosine: _Array, sine: _Array) -> _Array:
-    """Return the largest cosine within psi of a direction whose cosine is c."""
-    s = np.sqrt(np.maximum(1.0 - c * c, 0.0))
-    return np.where(c >= cosine, 1.0, c * cosine + s * sine)
-
-
-def _least_sine(c: _Array, cosine: _Array, sine: _Array) -> _Array:
-    """Return the least sine to a line within psi of a direction of cosine c to it."""
-    s = np.sqrt(np.maximum(1.0 - c * c, 0.0))
-    return np.where(c >= cosine, 0.0, np.maximum(s * cosine - c * sine, 0.0))
-
-
-def _dot(a: _Array, b: _Array) -> _Array:
-    return np.einsum("ij,ij->i", a, b)

@@ -10,6 +10,7 @@ from .picture_view import SUPERSAMPLING, Colour
 _COLOURS: dict[str, Colour] = {
     "edges": (120, 120, 125),
     "light": (215, 170, 20),
+    "phase": (120, 60, 150),
     "rings": (150, 120, 90),
     "linearity": (90, 140, 80),
     "camera": (0, 90, 160),

@@ -13,7 +13,7 @@ from geometry.shapes.boxes import OrientedBox
 from planning.model.bodies import Box
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedProjector
-from planning.scene.patterns import RingPattern
+from planning.scene.codes.patterns import pattern_of
 from planning.scene.placed_bodies import Device, placed_box
 
 from .picture_view import Colour, facing
@@ -68,7 +68,7 @@ def _figure(device: Device, centre: NDArray[np.float64], body_m: float) -> Devic
     else:
         radius = model.beam_reach
         if isinstance(device, PlannedProjector):
-            radius = min(radius, RingPattern(device).outermost)
+            radius = min(radius, pattern_of(device).outermost)
         body, beam = _parallel(model, radius, depth)
     if not isinstance(device, PlannedProjector):
         beam = []

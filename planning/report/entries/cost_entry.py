@@ -1,7 +1,10 @@
 """The plan's `cost`: eq. (8)."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import prod
+
+import numpy as np
 
 from planning.model.document.device_records import CameraRecord, ProjectorRecord
 from planning.model.document.input_records import FiguresRecord, RigRecord
@@ -44,11 +47,9 @@ def cost_record(
         scan: Where a check was made those of `render`, `decode` and `merge` [s].
     """
     pixels = sum(prod(camera.resolution) for camera in cameras)
-    n_rings, frame_s = (
-        [len(one.ring_radii) for one in projectors],
-        _frame_time(rig, projectors, cameras),
-    )
-    shown = n_frames(n_rings, len(cameras))
+    planned = [one.planned() for one in projectors]
+    frame_s = _frame_time(rig, projectors, cameras)
+    shown = n_frames(planned, len(cameras))
     t4 = sum(stages.get(name, 0.0) for name in _PROJECTOR_STAGES)
     known = CostRecord(
         pixels=pixels,
@@ -70,16 +71,18 @@ def cost_record(
     if frame_s is None:
         return known
     every = [
-        count + len(one.rings.left_out if one.rings else ())
-        for count, one in zip(n_rings, projectors, strict=True)
+        replace(one, ring_radii=np.append(one.ring_radii, record.rings.left_out))
+        if record.rings
+        else one
+        for one, record in zip(planned, projectors, strict=True)
     ]
     totals = {
-        name: n_frames(rings, count) * frame_s
+        name: n_frames(shows, count) * frame_s
         + pixels * count / len(cameras) * t2
         + (t3 + known.t4 + known.t5)
-        for name, rings, count in (
-            ("C", n_rings, len(cameras)),
-            ("C_before", n_rings, n_before),
+        for name, shows, count in (
+            ("C", planned, len(cameras)),
+            ("C_before", planned, n_before),
             ("C_all_rings", every, len(cameras)),
         )
     }

@@ -17,10 +17,7 @@ from planning.model.device_poses import DECIMALS, rounded_pose
 from planning.model.document.coverage_records import RegionRecord
 from planning.model.document.device_records import (
     CameraRecord,
-    OtherAxes,
-    OtherRings,
     ProjectorRecord,
-    RingAxes,
     camera_record,
     projector_record,
 )
@@ -29,6 +26,7 @@ from planning.model.document.input_records import (
     SelectionRecord,
 )
 from planning.model.document.part import Vector3
+from planning.model.document.ring_records import OtherAxes, OtherRings, RingAxes
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.report.claims import Claims
 from planning.report.judged import Devices
@@ -88,18 +86,32 @@ def projector_records(
         ).changed(
             **_mounted(scene.requirements.workspace.projector_mount, projector),
             rings=None if rings is None else rings.records[p],
-            ring_shares=ring_shares(scene, projector, devices.cameras),
+            **_shares(scene, projector, devices),
             **exposed[p],
         )
         for p, projector in enumerate(devices.projectors)
     )
 
 
+def _shares(
+    scene: Scene, projector: PlannedProjector, devices: Devices
+) -> dict[str, Any]:
+    """What becomes of its rings; no key where it has none."""
+    if projector.code is not None:
+        return {}
+    return {"ring_shares": ring_shares(scene, projector, devices.cameras)}
+
+
 def axes_record(
     scene: Scene, partial: PartialPlan, devices: Devices, claims: Claims
-) -> RingAxes:
-    """Return `ring_axes`: what was asked and taken, and what others would measure."""
+) -> RingAxes | None:
+    """Return `ring_axes`: what was asked and taken, and what others would measure.
+
+    None where the pattern has none.
+    """
     request, other = partial.request, None
+    if partial.axes is None:
+        return None
     if partial.other_axes:
         pairs = zip(partial.other_axes, devices.projectors, strict=True)
         turned = [rounded_projector(p, planned.id) for p, planned in pairs]

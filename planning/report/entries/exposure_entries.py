@@ -8,6 +8,7 @@ from planning.model.light.light_budget import LightBudget
 from planning.model.planned import PlannedProjector
 from planning.report.claims import Claims
 from planning.report.judged import Devices
+from planning.scene.codes.patterns import panel_light
 from planning.scene.lighting import (
     assigned_projectors,
     light_on,
@@ -16,7 +17,6 @@ from planning.scene.lighting import (
 )
 from planning.scene.limits.light_terms import electrons
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.patterns import panel_light
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 

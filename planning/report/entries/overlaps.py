@@ -24,9 +24,9 @@ from planning.model.document.coverage_records import ExposureSchedule, Overlap
 from planning.model.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 from planning.scene import lighting
+from planning.scene.codes.patterns import pattern_of
 from planning.scene.draws import DRAWS
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.patterns import pattern_of
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from solvers.colouring import fewest_colours

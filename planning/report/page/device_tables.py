@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from planning.model.document.device_records import ProjectorRecord
 from planning.model.plan import RigPlan
 from planning.model.words import area_words, percent
 from planning.report.summary.coverage_lines import schedule_lines
@@ -18,6 +19,7 @@ def device_tables(plan: RigPlan) -> Iterator[str]:
     yield _poses(plan)
     yield _mounts(plan)
     yield _rings(plan)
+    yield _codes(plan)
     yield _sequence(plan)
     yield _baselines(plan)
 
@@ -75,24 +77,53 @@ def _mounts(plan: RigPlan) -> str:
     return table("Mounts", head, rows)
 
 
+def _codes(plan: RigPlan) -> str:
+    """What tells the pixels of each projector; empty where rings do."""
+    rows = [
+        [
+            record.id,
+            f"{record.resolution[0]} x {record.resolution[1]}",
+            " + ".join(str(code.bits(n)) for n in record.resolution),
+            str(code.shifts) if code.shifts else "none",
+            str(code.period_px) if code.shifts else "",
+            str(code.n_frames(record.resolution)),
+            _exposure(record),
+        ]
+        for record in plan.document.projectors
+        if (code := record.code) is not None
+    ]
+    if not rows:
+        return ""
+    head = ("projector", "pixels", "Gray code bits", "shifts", "period [px]")
+    return table("Codes", (*head, "frames", "exposure [ms]"), rows)
+
+
+def _exposure(record: ProjectorRecord) -> str:
+    exposure = record.exposure
+    return "" if exposure is None else f"{1e3 * exposure.exposure_s:.1f}"
+
+
 def _rings(plan: RigPlan) -> str:
     rows: list[list[str]] = []
     for record in plan.document.projectors:
         shares, rings = record.ring_shares, record.rings
         gap = None if rings is None else rings.gap_m
         by_ring = () if shares is None else (shares.on_object, shares.measured)
-        exposure = record.exposure
+        if record.code is not None:
+            continue
         rows.append(
             [
                 record.id,
                 str(len(record.ring_radii)),
-                str(n_frames((len(record.ring_radii),), len(plan.cameras))),
+                str(n_frames((record.planned(),), len(plan.cameras))),
                 "" if gap is None else f"{1e3 * gap[0]:.1f} to {1e3 * gap[1]:.1f}",
                 *(percent(float(np.mean(values))) for values in by_ring),
                 *("" for _ in range(2 - len(by_ring))),
-                "" if exposure is None else f"{1e3 * exposure.exposure_s:.1f}",
+                _exposure(record),
             ]
         )
+    if plan.document.projectors and not rows:
+        return ""
     head = ("projector", "rings", "frames", "apart on the object [mm]")
     head += ("of a ring on the object", "of a ring measured", "exposure [ms]")
     return table("Rings", head, rows)

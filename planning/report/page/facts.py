@@ -104,6 +104,7 @@ def _limits(plan: RigPlan) -> dict[str, Any]:
         "too_dark": None if light is None else light.min_contrast,
         "clipped": None if light is None else 254.5,
         "conditioning": pair.min_conditioning,
+        "angle": list(pair.angles),
         "sigma": pair.max_sigma_m,
         "pitch": pair.min_ring_pitch_px,
     }
@@ -113,9 +114,7 @@ def _sequence(plan: RigPlan) -> list[dict[str, Any]]:
     """Which projectors shine in each step, and in how many frames."""
     schedule = plan.document.firing_schedule
     groups = schedule.groups if schedule else tuple((p.id,) for p in plan.projectors)
-    frames = {
-        p.id: n_frames((len(p.ring_radii),), len(plan.cameras)) for p in plan.projectors
-    }
+    frames = {p.id: n_frames((p,), len(plan.cameras)) for p in plan.projectors}
     return [
         {"on": list(group), "frames": [frames[name] for name in group]}
         for group in groups

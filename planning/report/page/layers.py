@@ -36,8 +36,9 @@ _NONE = "b9b2aa"
 # Values beyond these quantiles take the colours of the ends.
 _ENDS = (0.02, 0.98)
 _TERMS = {
-    "edges": "edge noise",
+    "edges": "noise in the image",
     "light": "noise of the light",
+    "phase": "noise of the phase",
     "rings": "ring placement",
     "linearity": "the panel's pixels",
     "camera": "calibration of the camera",

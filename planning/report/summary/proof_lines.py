@@ -12,6 +12,7 @@ _EXCLUDED = {
     "projector_range": "out of range",
     "projector_incidence": "beyond the incidence limit",
     "tangent_angle": "too near the steep direction",
+    "pixel_distance": "lit too coarsely",
     "projector_occlusion": "in shadow",
     "projector_body": "behind a device's body",
     "blocked_by_obstacle": "behind an obstacle",

@@ -1,17 +1,20 @@
 """What a plan says of its rings, and of estimated ranges, for a person."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from planning.model.document.device_records import (
+from planning.model.document.device_records import ProjectorRecord
+from planning.model.document.plan_document import PlanDocument
+from planning.model.document.ring_records import (
     OtherRings,
-    ProjectorRecord,
     RingSharesRecord,
     RingsRecord,
 )
-from planning.model.document.plan_document import PlanDocument
+from planning.model.light.dense_code import DenseCode
 from planning.model.plan import RigPlan
+from planning.model.planned import PlannedProjector
 from planning.model.words import labelled, percent
 from planning.rings.acquisition import n_frames
 from planning.rings.ring_stage import tolerance_m
@@ -19,6 +22,29 @@ from planning.rings.ring_stage import tolerance_m
 # As many of the chords between rings may err by more than was asked.
 _STRAY = 0.01
 _MM = 1e3
+
+
+def code_lines(plan: RigPlan) -> list[str]:
+    """Return the summary's lines on dense codes; none where rings are shown."""
+    lines = [
+        f"{p.id:<4} {p.code.n_frames(p.device.resolution)} frames: {_code_words(p)}"
+        for p in plan.projectors
+        if p.code is not None
+    ]
+    return ["", *labelled("CODES", lines)] if lines else []
+
+
+def _code_words(projector: PlannedProjector) -> str:
+    """Which frames tell its pixels."""
+    code, resolution = projector.code or DenseCode(), projector.device.resolution
+    bits = " + ".join(str(code.bits(n)) for n in resolution)
+    stripes = f"{bits} bits of Gray code down to {code.finest_px} px, each inverted"
+    if not code.shifts:
+        return f"{stripes}; white and black"
+    return (
+        f"{stripes}; white and black; {code.shifts} + {code.shifts} sinusoids of "
+        f"{code.period_px} px"
+    )
 
 
 def ring_lines(plan: RigPlan) -> list[str]:
@@ -78,8 +104,12 @@ def _axes_lines(plan: RigPlan) -> list[str]:
 def _rings_words(
     plan: RigPlan, projectors: Sequence[ProjectorRecord | OtherRings]
 ) -> str:
-    counts = [len(projector.ring_radii) for projector in projectors]
-    return f"{sum(counts)} rings in {n_frames(counts, len(plan.cameras))} frames"
+    shown = [
+        replace(planned, ring_radii=np.array(other.ring_radii))
+        for planned, other in zip(plan.projectors, projectors, strict=True)
+    ]
+    n_rings = sum(len(one.ring_radii) for one in shown)
+    return f"{n_rings} rings in {n_frames(shown, len(plan.cameras))} frames"
 
 
 def _notes(record: ProjectorRecord, tolerance_m: float) -> list[str]:

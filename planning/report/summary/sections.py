@@ -12,7 +12,7 @@ from .device_lines import device_lines, gap_lines, mount_lines
 from .light_lines import light_lines
 from .proof_lines import proof_lines
 from .region_lines import region_table
-from .ring_lines import range_lines, ring_lines
+from .ring_lines import code_lines, range_lines, ring_lines
 from .robust_lines import robust_lines
 from .zone_lines import zone_lines
 
@@ -78,7 +78,11 @@ SECTIONS = (
     Section(
         "rings",
         "how the circles of each projector are spaced, and what becomes of them.",
-        lambda plan: [*range_lines(plan.document), *ring_lines(plan)],
+        lambda plan: [
+            *range_lines(plan.document),
+            *ring_lines(plan),
+            *code_lines(plan),
+        ],
     ),
     Section(
         "check",

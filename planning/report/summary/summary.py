@@ -17,7 +17,7 @@ from .coverage_lines import coverage_lines, marginal_lines
 from .device_lines import axis_name, device_lines, mount_lines
 from .light_lines import light_lines
 from .proof_lines import proof_lines
-from .ring_lines import range_lines, ring_lines
+from .ring_lines import code_lines, range_lines, ring_lines
 from .robust_lines import robust_lines
 from .warning_lines import warning_lines
 
@@ -47,6 +47,7 @@ def summary(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
         *robust_lines(plan),
         *range_lines(plan.document),
         *ring_lines(plan),
+        *code_lines(plan),
         *(() if plan.document.evaluation else marginal_lines(plan)),
         *check_lines(plan),
         *(() if plan.document.evaluation else cost_lines(plan.document)),

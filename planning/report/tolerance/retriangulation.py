@@ -7,7 +7,8 @@ taken to stand. In the ring frame, with o + t d the viewing ray::
 
     x^2 + y^2 = R^2 z^2  (diverging, z > 0)    x^2 + y^2 = R^2  (parallel)
 
-a quadratic in t, of which the root nearest to the point's own distance is taken.
+a quadratic in t, of which the root nearest to the point's own distance is taken. Of
+coded pixels it is where the viewing ray comes nearest to the light of the pixel told.
 """
 
 import numpy as np
@@ -41,18 +42,22 @@ def retriangulated(
         camera: As it is taken to stand.
         off: By what each truly differs, (9,) numbers of `drawn_rigs`.
         edge_px: How far the edge is off in the image [px], (n, 2).
-        ring_m: How far the ring is off along its normal [m], (n,).
+        ring_m: How far the surface of equal code is off along its normal [m], (n,).
     """
     light = light_of(projector.device)
     drawn = _on_panel(projector, off[0], points)
+    pose = camera.world_from_device
+    pixels = _off_pixels(camera.device, _in_true(pose, off[1], points), off[1])
+    rays = camera.device.rays(pixels + edge_px) @ pose[:3, :3].T
+    if projector.code is not None:
+        beams = light.directions(projector.world_from_device, drawn)
+        reach = _nearest_approach(pose[:3, 3], rays, drawn, beams, ring_m)
+        return pose[:3, 3] + reach[:, None] * rays
     in_ring = inverse(projector.world_from_ring)
     rings = light.ring_surface(transform(in_ring, drawn))
     coordinate = rings.coordinate
     if np.any(ring_m):
         coordinate = coordinate + ring_m / rings.stretch
-    pose = camera.world_from_device
-    pixels = _off_pixels(camera.device, _in_true(pose, off[1], points), off[1])
-    rays = camera.device.rays(pixels + edge_px) @ pose[:3, :3].T
     reach = _nearest_root(
         transform(in_ring, pose[None, :3, 3])[0],
         rays @ in_ring[:3, :3].T,
@@ -61,6 +66,20 @@ def retriangulated(
         np.linalg.norm(points - pose[:3, 3], axis=1),
     )
     return pose[:3, 3] + reach[:, None] * rays
+
+
+def _nearest_approach(
+    origin: _Array, rays: _Array, drawn: _Array, beams: _Array, off_m: _Array | float
+) -> _Array:
+    """Where rays cross the surfaces through light that they cross most squarely, (n,).
+
+    NaN where they run along the light.
+    """
+    across = rays - np.einsum("ij,ij->i", rays, beams)[:, None] * beams
+    sine = np.linalg.norm(across, axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        m = across / sine[:, None]
+        return (np.einsum("ij,ij->i", drawn - origin, m) + off_m) / sine
 
 
 def _in_true(pose: Array, off: _Array, points: _Array) -> _Array:

@@ -54,6 +54,7 @@ _NAMED = {
     "mount": "where a device is fastened, and what it can be set to there",
     "placement": "where devices stand, and how many poses are tried",
     "rings": "the ring pattern",
+    "dense": "what tells every pixel of a projector, with --pattern dense",
     "workspace": "where devices may stand",
     "limits": "when a point counts as lit, seen and measurable",
     "photometry": "light: how bright rings come out in the images",

@@ -25,8 +25,16 @@ def edge_linearity_m(
         pixel_m: p, shape (n,).
         image_px_m: k, what a pixel of the image is along m [m], shape (n,).
     """
+    blur = blur_px(drawn, depths, pixel_m, image_px_m)
+    return pixel_m * edge_linearity_px(blur)
+
+
+def blur_px(
+    drawn: DrawnEdges, depths: _Array, pixel_m: _Array, image_px_m: _Array
+) -> _Array:
+    """Return b, the blur of light and image in pixels of the panel, (n,)."""
     blur_m = np.hypot(drawn.light_m(depths), drawn.camera_px * image_px_m)
-    return pixel_m * edge_linearity_px(blur_m / pixel_m)
+    return blur_m / pixel_m
 
 
 def edge_width_px(

@@ -1,4 +1,4 @@
-"""How bright lit and dark rings come out, and what noise that leaves to edges."""
+"""How bright lit and dark surface come out, and what noise that leaves to a code."""
 
 from dataclasses import dataclass
 
@@ -17,14 +17,14 @@ class GreyLevels:
     """Grey levels of 255 of n samples, shape (n,) each.
 
     Attributes:
-        white: Of lit rings where the surface is brightest.
+        white: Of lit surface where the surface is brightest.
         contrast: Lit less dark where it is darkest.
-        noise_px: Noise of an edge there, in the image [px].
+        noise: Of a pixel half lit there, as a share of the contrast.
     """
 
     white: _Array
     contrast: _Array
-    noise_px: _Array
+    noise: _Array
 
 
 def electrons(
@@ -50,28 +50,47 @@ def electrons(
 
 
 def grey_levels(
-    light: LightBudget, lit: _Array, dark: _Array, axis_cos: _Array, width_px: _Array
+    light: LightBudget, lit: _Array, dark: _Array, axis_cos: _Array
 ) -> GreyLevels:
-    """Return grey levels, and the noise of an edge where frame and inverse cross.
-
-    A lens is darker off its axis by cos^4. The edge's slope is the contrast S over
-    sqrt(2 pi) w; frame and inverse cross in its middle, each with the noise of M
-    electrons there, and their difference is twice as steep. It is found between two
-    pixels, whose noise averages to 2/3::
-
-        s_px = sqrt(2 pi / 3 (M + s_d^2)) w / S
+    """Return how bright samples come out: a lens is darker off its axis by cos^4.
 
     Args:
         light: Of devices.
         lit: Electrons of lit surface of albedo 1 on the axis, shape (n,).
         dark: Likewise of dark surface.
         axis_cos: Cosine of the angle off the camera's axis, shape (n,).
-        width_px: w, standard deviation of the edge's blur in the image [px], (n,).
     """
     low, high = light.albedo
     off_axis = axis_cos**4
     white, signal = high * off_axis * lit, low * off_axis * (lit - dark)
     middle = 0.5 * low * off_axis * (lit + dark)
-    noise = np.sqrt(_BETWEEN * np.pi * (middle + light.own_variance)) * width_px
+    noise = np.sqrt(middle + light.own_variance) / np.maximum(signal, 1e-9)
     grey = light.grey_per_electron
-    return GreyLevels(white * grey, signal * grey, noise / np.maximum(signal, 1e-9))
+    return GreyLevels(white * grey, signal * grey, noise)
+
+
+def edge_noise_px(grey: GreyLevels, width_px: _Array) -> _Array:
+    """Return the noise of an edge where frame and inverse cross [px], (n,).
+
+    The edge's slope is the contrast S over sqrt(2 pi) w; they cross in its middle, each
+    with the noise s_M of a pixel there, and their difference is twice as steep. It is
+    found between two pixels, whose noise averages to 2/3::
+
+        s_px = sqrt(2 pi / 3) s_M w / S
+
+    Args:
+        grey: Of the samples.
+        width_px: w, standard deviation of the edge's blur in the image [px], (n,).
+    """
+    return np.sqrt(_BETWEEN * np.pi) * grey.noise * width_px
+
+
+def phase_noise(grey: GreyLevels, shifts: int, modulation: _Array) -> _Array:
+    """Return the noise of the phase of shifted sinusoids [rad], (n,).
+
+    Of N images with the noise s_M a pixel, the amplitude is half the contrast S, of
+    which blur leaves a share M (`modulation`)::
+
+        s_phi = sqrt(2 / N) s_M / (M S / 2)
+    """
+    return np.sqrt(8.0 / shifts) * grey.noise / modulation

@@ -5,19 +5,16 @@ viewing ray, |r.m|, s_N and the pitch are those of `measurability`.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any
 
 import numpy as np
 
-from planning.model.light.light_budget import SATURATED
 from planning.model.requirements import TriangulationLimits
-from planning.scene.samples import LightOnSamples
 
-from .camera_limits import CAMERA_LIMITS, ROUNDING, SEEN_CAUSES, ViewedSamples
-from .light_terms import GreyLevels
+from .angle_limit import Angle
+from .camera_limits import CAMERA_LIMITS, ROUNDING, SEEN_CAUSES
+from .grey_limits import Clipped, TooDark
 from .limit import (
-    Array,
     Limit,
     LimitRelaxation,
     Mask,
@@ -26,134 +23,11 @@ from .limit import (
     to_digits,
     to_step,
 )
-
-# Of the edge's noise, as stated and by the light, of misplaced rings and of the panel's
-# pixels, s_N; of the calibration, s_C.
-Term = Literal["edges", "light", "rings", "linearity", "camera", "projector"]
-TERMS: tuple[Term, ...] = get_args(Term)
-NOISE_TERMS: tuple[Term, ...] = ("edges", "light", "rings", "linearity")
+from .pair_quality import PairCell, PairQuality
 
 # Beyond these no limit is worth relaxing: first-order errors hold no longer.
 _LEAST_CONDITIONING = 0.03
 _LEAST_PITCH_PX = 3.0
-# More or less light by more than this is another rig.
-_MOST_LIGHT = 30.0
-
-
-@dataclass(frozen=True, eq=False)
-class PairQuality:
-    """How well a pair triangulates n samples.
-
-    Attributes:
-        conditioning: |r.m|, shape (n,).
-        sigma: What `max_sigma_m` limits: s_N, or sqrt(s_N^2 + s_C^2) [m], shape (n,).
-        terms: Independent parts of the deviation along the normal by `TERMS` [m], (n,)
-            each; what is stated of none of them is absent.
-        pitch: Distance of neighbouring rings in the image in [px], shape (n,).
-        view: How the camera sees them: it stands at -t r from a sample.
-        light: That falls on them: the projector stands at minus its offsets.
-        edge_px: Noise of edges in the image [px], shape (n,).
-        drawn_m: How far rings and their edges lie off along m, rms [m], shape (n,).
-        grey: How bright they come out; None: nobody says.
-    """
-
-    conditioning: Array
-    sigma: Array
-    terms: dict[Term, Array]
-    pitch: Array
-    view: ViewedSamples
-    light: LightOnSamples
-    edge_px: Array
-    drawn_m: Array
-    grey: GreyLevels | None = None
-
-    @property
-    def total(self) -> Array:
-        """Root of the sum of the squares of all terms, in [m], shape (n,)."""
-        return np.sqrt(sum(np.square(term) for term in self.terms.values()))
-
-
-@dataclass(frozen=True, eq=False)
-class PairCell:
-    """The best of one projector with a camera anywhere in a cell of poses, (k,) each.
-
-    |r.m| and |N.r| at most, t |g| at least; s_px in [px], h in [m], and at least what
-    moves the surfaces of equal code, times |N.r| [m].
-    """
-
-    conditioning: Array
-    facing: Array
-    shift: Array
-    noise: Array
-    spacing: Array
-    placement: Array
-
-
-class TooDark(Limit[PairQuality, PairCell, TriangulationLimits]):
-    """Lit less dark >= min_contrast, where the surface is darkest."""
-
-    name = "too_dark"
-    words = "too dark in the image"
-
-    def holds(self, view: PairQuality, rules: TriangulationLimits) -> Mask | None:
-        """Return where lit and dark can be told apart."""
-        if view.grey is None or rules.light is None:
-            return None
-        return view.grey.contrast >= rules.light.min_contrast
-
-    def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:
-        """Yield more light: of the projector, through the lens, or for longer."""
-        light = facts.required.triangulation.light
-        if light is None:
-            return
-        least, lumens, number = light.min_contrast, light.lumens, light.f_number
-        longest, step = 1e3 * light.max_exposure_s, 1e3 * (light.period_s or 0.0)
-
-        def exposed(times: float) -> float:
-            return step * np.ceil(times * longest / step) if step else times * longest
-
-        yield LimitRelaxation(
-            self.name,
-            lambda pair: _within(least / np.maximum(pair.grey.contrast, 1e-9)),
-            to_digits(3),
-            lambda times: (
-                f"photometry.lumens = {times * lumens:.4g} (now {lumens:g}), "
-                f"camera.focus.f_number = {number / times**0.5:.3g} (now {number:g}) "
-                f"or photometry.max_exposure_ms = {exposed(times):.4g} (now "
-                f"{longest:.3g})"
-            ),
-        )
-
-
-class Clipped(Limit[PairQuality, PairCell, TriangulationLimits]):
-    """Lit surface below full scale, where it is brightest."""
-
-    name = "clipped"
-    words = "too bright for the sensor"
-
-    def holds(self, view: PairQuality, rules: TriangulationLimits) -> Mask | None:
-        """Return what doesn't clip."""
-        return None if view.grey is None else view.grey.white < SATURATED
-
-    def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:
-        """Yield less light."""
-        light = facts.required.triangulation.light
-        if light is None:
-            return
-        lumens, number = light.lumens, light.f_number
-        yield LimitRelaxation(
-            self.name,
-            lambda pair: _within(pair.grey.white / SATURATED),
-            to_digits(3),
-            lambda times: (
-                f"camera.focus.f_number = {number * times**0.5:.3g} (now {number:g}) "
-                f"or photometry.lumens = {lumens / times:.4g} (now {lumens:g})"
-            ),
-        )
-
-
-def _within(times: Array) -> Array:
-    return np.where(times <= _MOST_LIGHT, times, np.inf)
 
 
 class Conditioning(Limit[PairQuality, PairCell, TriangulationLimits]):
@@ -259,6 +133,7 @@ PAIR_LIMITS: tuple[Limit[Any, Any, Any], ...] = (
     TooDark(),
     Clipped(),
     Conditioning(),
+    Angle(),
     Sigma(),
     Pitch(),
 )

@@ -10,8 +10,8 @@ import numpy as np
 from geometry.devices import DeviceModel
 from planning.model.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
+from planning.scene.codes.patterns import pattern_of
 from planning.scene.lights import light_of
-from planning.scene.patterns import pattern_of
 from planning.scene.samples import SampleColumns
 
 from .limit import (
@@ -27,6 +27,7 @@ from .limit import (
     degrees,
     off_axis,
     range_ends,
+    to_digits,
     to_step,
     wider_angle,
 )
@@ -142,11 +143,43 @@ class TangentAngle(Limit[ProjectorView, object, ProjectorLimits]):
         )
 
 
+class PixelDistance(Limit[ProjectorView, object, ProjectorLimits]):
+    """p(z) / (-N.L) <= max_sample_distance, of a dense code."""
+
+    name = "pixel_distance"
+    words = "lit by too coarse pixels"
+
+    def holds(self, view: ProjectorView, rules: ProjectorLimits) -> Mask | None:
+        """Return where a pixel of the panel covers little enough of the surface."""
+        limit = rules.max_sample_distance_m
+        return None if limit is None else _pixel_distance(view) <= limit
+
+    def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:
+        """Yield a larger distance."""
+        limit = facts.required.projector.max_sample_distance_m
+        if limit is None:
+            return
+        yield LimitRelaxation(
+            self.name,
+            lambda view: 1e3 * _pixel_distance(view),
+            to_digits(3),
+            lambda value: (
+                f"limits.max_sample_distance_mm = {value:.3g} (now {1e3 * limit:g})"
+            ),
+        )
+
+
+def _pixel_distance(view: ProjectorView) -> Array:
+    wide = view.device.pixel_m(view.local[2])
+    return wide / np.maximum(view.incidence_cos, 1e-9)
+
+
 PROJECTOR_LIMITS: tuple[Limit[Any, Any, Any], ...] = (
     ProjectorBeam(),
     ProjectorRange(),
     ProjectorIncidence(),
     TangentAngle(),
+    PixelDistance(),
     InBetween("projector_occlusion", "shadowed from every projector that faces it"),
     InBetween("projector_body", "kept from the light by a device's body"),
     InBetween(BY_OBSTACLE, "behind an obstacle"),

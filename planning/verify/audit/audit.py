@@ -34,6 +34,7 @@ from planning.verify.audit.coverage.survival_claims import (
     unmet_after_losses,
 )
 from planning.verify.audit.devices.body_claims import audit_bodies, audit_clearance
+from planning.verify.audit.devices.code_claims import audit_codes
 from planning.verify.audit.devices.device_claims import audit_devices, audit_existing
 from planning.verify.audit.devices.evaluation_claims import audit_evaluation
 from planning.verify.audit.devices.exposure_claims import audit_exposures
@@ -50,6 +51,7 @@ from .audit_findings import AuditFindings
 
 _CLAIMS = (
     audit_devices,
+    audit_codes,
     audit_workspace,
     audit_zones,
     audit_existing,
@@ -116,10 +118,9 @@ def audit_plan(
     Raises:
         PlanFileError: If the plan is broken, so that its claims have no meaning.
     """
-    if plan.requirements.pattern != "rings":
+    if plan.requirements.pattern == "none":
         raise PlanFileError(
-            f"requirements.pattern is {plan.requirements.pattern!r}; only 'rings' can "
-            f"be audited"
+            "requirements.pattern is 'none'; only 'rings' and 'dense' can be audited"
         )
     threads = threads or n_threads()
     case = examine(plan, seed=seed, n_samples=n_samples, threads=threads)

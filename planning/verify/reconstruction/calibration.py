@@ -21,9 +21,8 @@ from planning.verify.reconstruction.patterns.ring_patterns import (
 from .arrays import Array, Mask
 from .light_laws import LIGHTS, LightLaw
 from .patterns.defocus import Defocus
-
-_UNDISTORT_STEPS = 60
-_UNDISTORT_TOLERANCE = 1e-13
+from .patterns.dense_patterns import DensePattern
+from .patterns.lens import bent, unbent
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,52 +85,22 @@ class CameraCalibration(DeviceCalibration):
 
     def project(self, points: Array) -> Array:
         """Return pixels (n, 2) of world points (n, 3); NaN behind the camera."""
-        x, y, z = self._local(points).T
-        z = np.where(z > 0.0, z, np.nan)
-        x, y = x / z, y / z
-        radial, shift_x, shift_y = self._terms(x, y)
-        return self._pixels(
-            np.column_stack([x * radial + shift_x, y * radial + shift_y])
-        )
+        local = self._local(points)
+        z = np.where(local[:, 2] > 0.0, local[:, 2], np.nan)
+        return self._pixels(bent(local[:, :2] / z[:, None], self.distortion))
 
     def rays(self, pixels: Array) -> Array:
         """Return unit viewing directions (n, 3) in the world of pixels (n, 2).
 
-        The lens is inverted by the fixed point ``p = (q - tangential(p)) / radial(p)``;
-        NaN where that doesn't settle: no point of the scene is imaged there.
+        NaN where no point of the scene is imaged: the lens folds there.
         """
-        x, y = self.panel_coordinates(pixels).T
+        flat = self.panel_coordinates(pixels)
         if any(self.distortion):
-            x, y = self._unbend(x, y)
+            flat = unbent(flat, self.distortion)
+        x, y = flat.T
         scale = 1.0 / np.sqrt(x * x + y * y + 1.0)
         local = np.column_stack([x * scale, y * scale, scale])
         return local @ self.world_from_device[:3, :3].T
-
-    def _terms(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
-        """Radial factor and the two tangential shifts of the lens."""
-        k1, k2, p1, p2, k3 = self.distortion
-        xx, xy, yy = x * x, x * y, y * y
-        s = xx + yy
-        radial = 1.0 + k1 * s + k2 * s**2 + k3 * s**3
-        return (
-            radial,
-            2.0 * p1 * xy + p2 * (s + 2.0 * xx),
-            p1 * (s + 2.0 * yy) + (2.0 * p2 * xy),
-        )
-
-    def _unbend(self, qx: Array, qy: Array) -> tuple[Array, Array]:
-        x, y = qx, qy
-        change = np.full_like(qx, np.inf)
-        with np.errstate(all="ignore"):
-            for _ in range(_UNDISTORT_STEPS):
-                radial, shift_x, shift_y = self._terms(x, y)
-                new_x, new_y = (qx - shift_x) / radial, (qy - shift_y) / radial
-                change = np.abs(new_x - x) + np.abs(new_y - y)
-                x, y = new_x, new_y
-                if np.all(change < _UNDISTORT_TOLERANCE):
-                    break
-        settled = change < 1e3 * _UNDISTORT_TOLERANCE
-        return np.where(settled, x, np.nan), np.where(settled, y, np.nan)
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,6 +114,8 @@ class ProjectorCalibration(DeviceCalibration):
         response: Light of its grey levels.
         drawn_for: The matrix that its images were drawn for; None: its own. With other
             optics than that a ring isn't a circle any more, but still a conic.
+        dense: What it codes its pixels by, `pattern` being without rings; None: rings.
+        distortion: Of the lens of a projector that codes its pixels, as of a camera's.
     """
 
     world_from_ring: Array
@@ -152,6 +123,8 @@ class ProjectorCalibration(DeviceCalibration):
     pattern: DrawnRings
     response: Response = field(default=Response(), kw_only=True)
     drawn_for: Array | None = field(default=None, kw_only=True)
+    dense: DensePattern | None = field(default=None, kw_only=True)
+    distortion: tuple[float, ...] = field(default=(0.0,) * 5, kw_only=True)
 
     @property
     def light(self) -> LightLaw:
@@ -244,7 +217,14 @@ class ProjectorCalibration(DeviceCalibration):
         z = local[:, 2]
         shrink = self.light.shrink(np.where(z > 0.0, z, 1.0))
         flat = local[:, :2] * np.where(z > 0.0, shrink, np.nan)[:, None]
+        if any(self.distortion):
+            flat = bent(flat, self.distortion)
         return self._pixels(flat), z
+
+    def flattened(self, pixels: Array) -> Array:
+        """Return p (n, 2) of the light of pixels (n, 2); NaN: its lens folds there."""
+        flat = self.panel_coordinates(pixels)
+        return unbent(flat, self.distortion) if any(self.distortion) else flat
 
     def pixel_m(self, points: Array) -> Array:
         """Return how wide a pixel is at world points (n, 3), across the beam [m]."""
@@ -296,8 +276,11 @@ def calibrate_projector(projector: PlannedProjector) -> ProjectorCalibration:
         scale = 1.0 / device.pixel_pitch_m
         matrix = np.diag([scale, scale, 1.0])
         matrix[:2, 2] = 0.5 * (width - 1), 0.5 * (height - 1)
+        lens = (0.0,) * 5
     else:
         beam_radius, matrix = None, device.camera_matrix
+        lens = device.distortion
+    code = projector.code
     return ProjectorCalibration(
         projector.id,
         projector.world_from_device,
@@ -307,4 +290,6 @@ def calibrate_projector(projector: PlannedProjector) -> ProjectorCalibration:
         beam_radius,
         DrawnRings(LIGHTS[projector.light], projector.ring_radii),
         body=projector.body,
+        dense=None if code is None else DensePattern(code, device.resolution),
+        distortion=(0.0,) * 5 if code is None else lens,
     )

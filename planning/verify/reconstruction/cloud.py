@@ -13,7 +13,10 @@ _NORMAL_RAD = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Cloud(Columns):
-    """Points triangulated from ring edges.
+    """Points triangulated from ring edges, or from coded pixels.
+
+    What is said of edges is of coded pixels their code along the epipolar line, in
+    pixels of the projector, or of the second camera.
 
     Attributes:
         points: In the world [m], shape (n, 3).
@@ -22,8 +25,9 @@ class Cloud(Columns):
         pixels: Sub-pixel positions (u, v) in the camera's image, shape (n, 2).
         camera: Index of the camera, shape (n,).
         projector: Index of the projector, shape (n,).
-        ring: Index of the ring edge, shape (n,).
-        conditioning: r.m, shape (n,).
+        ring: Index of the ring edge; -1: of a coded pixel; -2 - k: of a coded pixel
+            that camera k sees, too, whose viewing rays are the `beams`, shape (n,).
+        conditioning: r.m; of coded pixels the sine of the triangulation angle, (n,).
         shift: Displacement of the point when its edge moves by one pixel across itself,
             in [m/px], shape (n, 3).
         noise_px: Standard deviation of the edge's position across itself [px], (n,).
@@ -44,6 +48,11 @@ class Cloud(Columns):
     noise_px: Array
     blur_px: Array
     bias_px: Array
+
+    @property
+    def by_camera(self) -> NDArray[np.int16]:
+        """Second camera of points that two cameras measured; negative: none, (n,)."""
+        return (-2 - self.ring).astype(np.int16)
 
     def of_devices(self, projector: int, camera: int) -> "Cloud":
         """Return the points with these indices of their devices."""

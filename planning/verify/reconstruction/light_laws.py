@@ -85,6 +85,14 @@ class LightLaw:
         """Return p (n, 2) at points (n, 3) in the frame of the device or its rings."""
         return local[:, :2]
 
+    def off_light(self, local: Array, p: Array, moves: bool = False) -> Array:
+        """Return how far points (n, 3) are across from the light p (n, 2), (n, 2).
+
+        Linear in the points; ``(x, y) - p``, or ``(x, y) - p z``. Of what a point
+        `moves` by, how much farther it is.
+        """
+        return local[:, :2] - (0.0 if moves else 1.0) * p
+
     def chart(self, depth: Array) -> Array:
         """Return the height z that is linear over |p| on a plane: z, or 1 / z."""
         return depth
@@ -148,6 +156,9 @@ class _Diverging(LightLaw):
 
     def falloff(self, depth: Array) -> Array | float:
         return (float(np.median(depth)) / depth) ** 2
+
+    def off_light(self, local: Array, p: Array, moves: bool = False) -> Array:
+        return local[:, :2] - p * local[:, 2:]
 
     def chart(self, depth: Array) -> Array:
         return 1.0 / depth

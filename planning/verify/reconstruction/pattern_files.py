@@ -44,12 +44,27 @@ _NOTES = {
     "root": "bright where r.m > 0, with the viewing ray r of that camera and the ring "
     "normal m: which of two points of a ring it sees",
 }
+_DENSE_NOTES = {
+    **{key: _NOTES[key] for key in ("exposure", "grey")},
+    "order": "projector by projector as listed, all others dark; each in its frames' "
+    "order, that of OpenCV's GrayCodePattern with white, black and sinusoids behind "
+    "it; every camera records every frame",
+    "index": "stripe g holds the columns (or rows) finest_px g to finest_px (g + 1) - "
+    "1; its code is g ^ (g >> 1), of which bit b is bright in the frame with that bit",
+    "phase": "share k of white at column (or row) u is 1/2 + 1/2 cos(2 pi (u / "
+    "period_px - k / shifts))",
+}
 
 
 def drawn_by(
     projector: ProjectorCalibration, cameras: Sequence[CameraCalibration]
 ) -> Callable[[Frame], NDArray[np.uint8]]:
     """Return what gives the grey levels (h, w) of a projector's frames for cameras."""
+    dense = projector.dense
+    if dense is not None:
+        return lambda frame: dense.levels(
+            dense.frames[frame.number], projector.response
+        )
     seen = {camera.id: projector.pattern_for(camera) for camera in cameras}
     canvas = PanelCanvas.of(projector, projector.pattern, seen)
     return lambda frame: frame_levels(
@@ -76,7 +91,7 @@ def pattern_contents(
                 "light": projector.light.name,
                 "resolution": list(projector.resolution),
                 "response": projector.response.light.tolist(),
-                **projector.pattern.entry(),
+                **(projector.dense or projector.pattern).entry(),
                 "frames": [
                     {"png": f"{projector.id}/{frame.name}.png", **vars(frame)}
                     for frame in frames
@@ -87,7 +102,8 @@ def pattern_contents(
         "format": _SECTION,
         "version": 1,
         "plan": scanner.digest,
-        **_NOTES,
+        **(_DENSE_NOTES if scanner.is_dense else {}),
+        **({} if all(one.dense for one in scanner.projectors) else _NOTES),
         "projectors": entries,
     }
     text = json.dumps(manifest, indent=1, allow_nan=False) + "\n"

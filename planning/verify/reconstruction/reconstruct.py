@@ -19,6 +19,7 @@ from planning.verify.reconstruction.check.merge import Merged, merge
 from planning.verify.reconstruction.check.overlaps import ring_pitch_px
 from planning.verify.reconstruction.check.result import PairCount, Reconstruction
 from planning.verify.reconstruction.decode.decode import Pairs
+from planning.verify.reconstruction.decode.dense.camera_pairs import between_cameras
 from planning.verify.reconstruction.density.second_sequence import (
     both_sequences,
     numbered,
@@ -116,7 +117,11 @@ def reconstruct_twice(
     Where these lie follows from the first points (`second_sequence`). Arguments are as
     of `reconstruct`; `mounted` is how the devices stand, as the decoder knows, too. The
     second sequence's noise is another.
+
+    Raises:
+        InputError: If the pattern is dense.
     """
+    plan.require_rings("a second sequence")
     threads = threads or n_threads()
     light, stands = photometry or assumed_light(plan), mounted or plan
     if expected is None:
@@ -184,7 +189,10 @@ def conclude(
     Without photometry the images were taken. The time of merging is added to `spent`.
     """
     expected = expected or _fresh(plan, seed)
-    spent, everything = spent or Spent(), _everything(decoded)
+    spent = spent or Spent()
+    with spent.on("decode"):
+        decoded = with_camera_pairs(plan, decoded)
+    everything = _everything(decoded)
     with spent.on("merge"):
         lit = {pair: gave.lit for pair, gave in decoded}
         merged = merge(everything, plan, lit, pitch_px=ring_pitch_px(everything, plan))
@@ -202,6 +210,25 @@ def _everything(decoded: Pairs) -> Cloud:
     return Cloud.join([pair.cloud.of_devices(p, c) for (p, c), pair in decoded])
 
 
+def with_camera_pairs(plan: Scanner, decoded: Pairs) -> Pairs:
+    """Return what pairs measured, with what two cameras of a projector did.
+
+    Points of two cameras are added to those of the first of them.
+    """
+    if not plan.is_dense:
+        return decoded
+    codes = {pair: gave.codes for pair, gave in decoded if gave.codes is not None}
+    every: Pairs = []
+    for (p, c), gave in decoded:
+        for k in range(c + 1, len(plan.cameras)):
+            if (p, c) in codes and (p, k) in codes:
+                one, other = ((plan.cameras[i], codes[p, i]) for i in (c, k))
+                cloud, n_asked = between_cameras(one, other, plan.limits.dense)
+                gave = gave.with_camera(cloud, k, n_asked)
+        every.append(((p, c), gave))
+    return every
+
+
 def _judged(
     plan: Scanner,
     decoded: Pairs,
@@ -217,7 +244,7 @@ def _judged(
     )
     pairs = tuple(PairCount.of(plan, pair, gave) for pair, gave in decoded)
     inside = np.zeros(0, dtype=bool)
-    accuracy, why = None, rejection(pairs) or "no ring edge was decoded"
+    accuracy, why = None, rejection(pairs) or "nothing was decoded"
     failures: tuple[str, ...] = (f"no point was measured: {why}",)
     if len(merged.cloud):
         places = [camera.centre for camera in plan.cameras]

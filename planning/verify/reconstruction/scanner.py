@@ -8,6 +8,7 @@ import numpy as np
 
 from geometry.mesh.mesh import TriangleMesh
 from planning.model.calibration_errors import CalibrationErrors
+from planning.model.errors import InputError
 from planning.model.light.light_budget import LightBudget
 from planning.model.obstacles import Obstacle
 from planning.model.plan import RigPlan
@@ -24,12 +25,15 @@ from .calibration import (
     calibrate_camera,
     calibrate_projector,
 )
+from .decode.dense.dense_limits import DenseLimits
 from .patterns.defocus import Defocus, defocus_of
 
 # Rings that run more steeply along the viewing ray cross steps between surfaces, unless
 # the plan counts on surface seen at such incidence [rad].
 _SLANTED = np.deg2rad(65.0)
 _SLANT_MARGIN = np.deg2rad(5.0)
+# Points of coded pixels are made this share of tau apart on the object.
+_SPACING = 0.25
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,8 @@ class ScanLimits:
         max_lit: Largest incidence of light that counts [rad].
         max_seen: Largest incidence at a camera that counts [rad].
         max_sigma_m: Largest standard deviation of a point that counts [m].
+        min_angle: Least triangulation angle of points of coded pixels [rad].
+        max_angle: Largest of these [rad].
     """
 
     check: CheckLimits
@@ -49,15 +55,35 @@ class ScanLimits:
     max_lit: float
     max_seen: float
     max_sigma_m: float = np.inf
+    min_angle: float | None = None
+    max_angle: float | None = None
+
+    @property
+    def _max_slant(self) -> float:
+        return float(np.tan(max(self.max_seen - _SLANT_MARGIN, _SLANTED)))
 
     @property
     def decoder(self) -> dict[str, float]:
         """Limits that `decode` takes."""
-        steepest = max(self.max_seen - _SLANT_MARGIN, _SLANTED)
         return {
             "min_conditioning": self.min_conditioning,
-            "max_slant": float(np.tan(steepest)),
+            "max_slant": self._max_slant,
         }
+
+    @property
+    def dense(self) -> DenseLimits:
+        """Limits that `decode_dense` takes.
+
+        Points vaguer than half of tau say nothing of what lies within tau.
+        """
+        tau = self.check.tau_m
+        return DenseLimits(
+            min_angle=0.0 if self.min_angle is None else self.min_angle,
+            max_angle=np.pi if self.max_angle is None else self.max_angle,
+            max_slant=self._max_slant,
+            max_sigma_m=min(0.5 * tau, self.max_sigma_m),
+            spacing_m=_SPACING * tau,
+        )
 
 
 @dataclass(frozen=True)
@@ -132,6 +158,8 @@ class Scanner:
                 wanted.projector.max_incidence,
                 wanted.camera.max_incidence,
                 wanted.triangulation.max_sigma_m or np.inf,
+                wanted.triangulation.min_angle,
+                wanted.triangulation.max_angle,
             ),
             defocus_of(document.rig.projector),
             tuple(frozenset(group) for group in (schedule.groups if schedule else ())),
@@ -160,7 +188,27 @@ class Scanner:
 
     def frames(self, p: int) -> tuple[Frame, ...]:
         """Return what a projector shows for all cameras, in order."""
-        return self.projectors[p].pattern.frames(camera.id for camera in self.cameras)
+        projector = self.projectors[p]
+        if projector.dense is not None:
+            return projector.dense.frames
+        return projector.pattern.frames(camera.id for camera in self.cameras)
+
+    @property
+    def is_dense(self) -> bool:
+        """Whether some projector codes its pixels."""
+        return any(projector.dense is not None for projector in self.projectors)
+
+    def require_rings(self, what: str) -> None:
+        """Refuse what is made for rings alone.
+
+        Raises:
+            InputError: If some projector codes its pixels.
+        """
+        if self.is_dense:
+            raise InputError(
+                f"{what} is of ring patterns, and this plan's pattern is dense; leave "
+                f"it out, or plan with --pattern rings"
+            )
 
     def frame_names(self, p: int, c: int) -> tuple[str, ...]:
         """Return the names of the frames that a camera's decoder reads, in order."""

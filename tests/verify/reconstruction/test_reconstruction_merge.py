@@ -17,7 +17,7 @@ from planning.verify.reconstruction.check.calibration_sigma import (
 )
 from planning.verify.reconstruction.check.merge import Merged, merge
 from planning.verify.reconstruction.check.overlaps import compare_overlaps
-from planning.verify.reconstruction.check.ring_fit import Lines
+from planning.verify.reconstruction.check.rings.ring_fit import Lines
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.decode.decode import Pairs
 from planning.verify.reconstruction.decode.lit_image import LitImage

@@ -81,6 +81,7 @@ function beam(device, depth, colour) {
   const near = imageCorners(device).map((c) => atDepth(device, c, 0));
   const far = imageCorners(device).map((c) => atDepth(device, c, depth));
   group.add(lines([...loop(far), ...near.flatMap((c, k) => [c, far[k]])], colour, 0.5));
+  if (!device.radii.length) return group;
   const fromRing = matrix(device.pose).invert().multiply(matrix(device.ring));
   const last = device.radii.at(-1);
   const circle = Array.from({ length: ROUND }, (_, k) => {

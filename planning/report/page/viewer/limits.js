@@ -66,6 +66,7 @@ function outside(device, at) {
 }
 
 function beyondRings(device, point) {
+  if (!device.radii.length) return "at the very edge of its image";
   const ring = point.clone().applyMatrix4(matrix(device.ring).invert());
   const radius = Math.hypot(ring.x, ring.y);
   const last = device.radii.at(-1);
@@ -104,6 +105,12 @@ export function whyNot(device, cause, at, { point, normal, steep, limits }) {
     const asks = Math.floor((180 / Math.PI) * Math.min(angle, limits.min_tangent_angle));
     return `tangent angle ${against(angle, limits.min_tangent_angle, degrees, false)}; limits.min_tangent_angle_deg = ${asks} would do`;
   }
+  if (cause === "pixel_distance") {
+    const wide = device.K ? at.local.z / Math.sqrt(device.K[0][0] * device.K[1][1]) : device.pitch;
+    const coarse = wide / -normal.dot(at.along);
+    const asks = Math.max(coarse, limits.max_sample_distance_m);
+    return `a pixel covers ${against(coarse, limits.max_sample_distance_m, (metres) => mm(metres, 3), true)}; limits.max_sample_distance_mm = ${(1e3 * asks).toPrecision(3)} would do`;
+  }
   if (cause === "sample_distance") {
     const [[fx], [, fy]] = device.K;
     const coarse = at.local.z / (Math.sqrt(fx * fy) * -normal.dot(at.along));
@@ -123,6 +130,13 @@ export function whyNoPair(cause, value, limits) {
       return `off by ${against(value, limit, (x) => mm(x, 3), true)}; --accuracy ${(1e3 * Math.max(value, limit) * 1.005).toPrecision(3)} would do`;
     case "conditioning":
       return `|r.m| ${against(value, limit, plain, false)}, on a blind curve; limits.min_conditioning = ${(Math.floor(100 * Math.min(value, limit)) / 100).toFixed(2)} would do`;
+    case "angle": {
+      const [low, high] = limit;
+      const small = value < low;
+      const asks = (180 / Math.PI) * (small ? Math.min(value, low) : Math.max(value, high));
+      const help = small ? `min_angle_deg = ${Math.floor(asks)}` : `max_angle_deg = ${Math.ceil(asks)}`;
+      return `ray and light meet at ${against(value, small ? low : high, degrees, !small)}; limits.${help} would do`;
+    }
     case "pitch":
       return `rings ${against(value, limit, (x) => `${plain(x)} px`, false)} apart in the image; rings ${plain(limit / value)} times as far apart would do`;
     case "too_dark":

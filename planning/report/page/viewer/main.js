@@ -48,7 +48,9 @@ async function start() {
   });
 
   const isOn = (name) => byId(`show-${name}`)?.checked ?? false;
-  const rings = projectors.map((p) => check("rings-of", `rings-${p.id}`, p.id, false));
+  const ringed = projectors.filter((p) => p.radii.length);
+  byId("rings-of").hidden = !ringed.length;
+  const rings = new Map(ringed.map((p) => [p, check("rings-of", `rings-${p.id}`, p.id, false)]));
 
   function update() {
     const on = Object.fromEntries(SHOWN.map((name) => [name, isOn(name)]));
@@ -57,8 +59,8 @@ async function start() {
     surface.mesh.visible = on.surface;
     zones.visible = on.zones;
     obstacles.visible = on.obstacles;
-    const asked = projectors.map((p, k) =>
-      shining ? shining.includes(p.id) : rings[k].checked || stage.eye?.device === p,
+    const asked = projectors.map((p) =>
+      shining ? shining.includes(p.id) : rings.get(p)?.checked || stage.eye?.device === p,
     );
     surface.uniforms.ringsOn.value = asked.reduce((bits, lit, k) => bits | (lit ? 1 << k : 0), 0);
     stage.redraw();

@@ -210,9 +210,11 @@ export class Surface {
 
 function ringUniforms(projectors) {
   const count = Math.max(projectors.length, 1);
+  // What is coded by pixels has no ring: none is ever near.
+  const drawn = (p) => (p.radii.length ? p.radii : [1e30, 2e30]);
   const most = Math.max(2, ...projectors.map((p) => p.radii.length));
   const radii = new Float32Array(most * count);
-  projectors.forEach((p, row) => radii.set(p.radii, row * most));
+  projectors.forEach((p, row) => radii.set(drawn(p), row * most));
   const lines = new THREE.DataTexture(radii, most, count, THREE.RedFormat, THREE.FloatType);
   lines.needsUpdate = true;
   const filled = projectors.length ? projectors : [{ ring: null, radii: [1, 2] }];
@@ -220,7 +222,7 @@ function ringUniforms(projectors) {
   const shades = [0x8c2d04, 0x08306b, 0x00441b, 0x4a1486, 0x67000d, 0x252525];
   return {
     radii: { value: lines },
-    nRadii: { value: filled.map((p) => p.radii.length) },
+    nRadii: { value: filled.map((p) => drawn(p).length) },
     parallel: { value: filled.map((p) => p.pitch !== undefined) },
     ringFromWorld: { value: filled.map((p) => ringOf(p).invert()) },
     ringColour: { value: filled.map((_, k) => new THREE.Color(shades[k % 6])) },

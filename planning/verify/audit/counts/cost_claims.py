@@ -47,10 +47,17 @@ def audit_cost(case: AuditCase, findings: AuditFindings) -> None:
 def _frames(plan: RigPlan, n_cameras: int, *, left_out: bool = False) -> int:
     """White and black; a code for each annulus, a disc for each camera; inverses.
 
-    Perhaps with the rings that were left out.
+    Perhaps with the rings that were left out. Of a dense code a bit for each halving
+    of the panel's width and height down to half a period, or to a pixel; and sinusoids.
     """
     coded = 0
     for projector in plan.document.projectors:
+        if (code := projector.code) is not None:
+            stripe = code.period_px / 2 if code.shifts else 1
+            halvings = (math.log2(side / stripe) for side in projector.resolution)
+            bits = sum(max(1, math.ceil(each - 1e-9)) for each in halvings)
+            coded += bits + code.shifts + 1
+            continue
         n_annuli = len(projector.ring_radii) + 1
         if left_out and projector.rings is not None:
             n_annuli += len(projector.rings.left_out)

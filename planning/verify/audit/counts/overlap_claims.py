@@ -70,8 +70,10 @@ def light_falls(
 
     Its last annulus ends one gap beyond its last ring.
     """
-    before, last = (0.0, *projector.radii)[-2:]
-    outer = replace(projector, radii=np.array([last, last + (last - before)]))
+    outer = projector
+    if projector.code is None:
+        before, last = (0.0, *projector.radii)[-2:]
+        outer = replace(projector, radii=np.array([last, last + (last - before)]))
     along, length = projector.light.to_points(samples.points)
     falls = outer.in_beam(samples.points) & (length >= 0.0)
     falls &= -dot(samples.normals, along) >= _GRAZING

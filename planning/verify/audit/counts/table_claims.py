@@ -99,21 +99,32 @@ _RELATIVE = 1e-6
 _METRES = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 _DEGREE = math.pi / 180.0
 # Largest s_N isn't among them: the command line may ask for another accuracy.
-_LIMITS = (
+_LIMITS: tuple[tuple[str, str, str, float], ...] = (
     ("projector_max_incidence_deg", "projector", "max_incidence", _DEGREE),
     ("min_tangent_angle_deg", "projector", "min_tangent_angle", _DEGREE),
     ("camera_max_incidence_deg", "camera", "max_incidence", _DEGREE),
-    ("min_conditioning", "triangulation", "min_conditioning", 1.0),
     ("noise_px", "triangulation", "noise_px", 1.0),
+)
+_OF_RINGS = (
+    ("min_conditioning", "triangulation", "min_conditioning", 1.0),
     ("min_ring_pitch_px", "triangulation", "min_ring_pitch_px", 1.0),
 )
+_OF_PIXELS = (
+    ("min_angle_deg", "triangulation", "min_angle", _DEGREE),
+    ("max_angle_deg", "triangulation", "max_angle", _DEGREE),
+)
+# Where a rig states none, docs/reference/rig-files.md.
+_ANGLES = {"min_angle_deg": 10.0, "max_angle_deg": 90.0}
 
 
 def audit_limits(case: AuditCase, findings: AuditFindings) -> None:
     """The rig's limits are those of the requirements."""
     limits = case.plan.document.rig.limits
-    for name, part, wish, unit in _LIMITS:
+    own = _OF_RINGS if case.plan.requirements.pattern == "rings" else _OF_PIXELS
+    for name, part, wish, unit in _LIMITS + own:
         stated, whose = limits.get(name), f"rig.limits.{name}"
+        if stated is None:
+            stated = _ANGLES.get(name)
         truth = None if stated is None else unit * stated
         required = getattr(getattr(case.plan.requirements, part), wish)
         key = f"requirements.{part}.{wish}"

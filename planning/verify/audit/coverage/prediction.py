@@ -64,7 +64,12 @@ def possible_at_floors(plan: RigPlan, samples: AuditSamples, *, threads: int) ->
 def receding(
     projector: AuditProjector, camera: AuditCamera, samples: AuditSamples
 ) -> Array:
-    """Return |r.T|, T = N x m / |N x m|: the sine of the slant along a ring, (n,)."""
+    """Return |r.T|, T = N x m / |N x m|: the sine of the slant along a ring, (n,).
+
+    0 where there are no rings.
+    """
+    if projector.code is not None:
+        return np.zeros(len(samples))
     with np.errstate(divide="ignore", invalid="ignore"):
         tangent = np.cross(samples.normals, projector.ring_gradient(samples.points))
         tangent /= np.linalg.norm(tangent, axis=1)[:, None]

@@ -66,7 +66,8 @@ def audit_devices(case: AuditCase, findings: AuditFindings) -> None:
         audit_poses("world_from_ring", np.array([record.world_from_ring]), below)
         ring = projector.world_from_ring
         audit_ring_frames("world_from_ring", projector.light, ring, below)
-        _audit_last_ring(record, document, space, below)
+        if record.code is None:
+            _audit_last_ring(record, document, space, below)
         below.same("light", record.light, document.rig.light, "rig.light")
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from geometry.arrays import Array, Mask
 from geometry.devices import ParallelModel, PinholeModel
+from planning.model.light.dense_code import DenseCode
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
 
@@ -202,7 +203,8 @@ class AuditProjector:
 
     `radii` are of its rings, of a reference pose the outermost alone; `blocks` are the
     bodies of other devices, which stand in its light. `exposure_s` is what its frames
-    are exposed for [s], where the plan counts light.
+    are exposed for [s], where the plan counts light. With a `code` all its pixels are
+    told, and there are no rings.
     """
 
     device: PinholeModel | ParallelModel
@@ -211,6 +213,7 @@ class AuditProjector:
     radii: Array
     blocks: tuple[Block, ...] = ()
     exposure_s: float | None = None
+    code: DenseCode | None = None
 
     @cached_property
     def light(self) -> DivergingRays | ParallelRays:
@@ -243,9 +246,10 @@ class AuditProjector:
 
     def in_beam(self, points: Array) -> Mask:
         """Return whether points lie in the beam and inside the last ring, (n,)."""
-        return self.light.leaves(points) & (
-            self.ring_coordinate(points) <= self.radii[-1]
-        )
+        leaves = self.light.leaves(points)
+        if self.code is not None:
+            return leaves
+        return leaves & (self.ring_coordinate(points) <= self.radii[-1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,6 +271,7 @@ def audit_projectors(plan: RigPlan) -> tuple[AuditProjector, ...]:
             p.ring_radii,
             bodies_but(plan, p),
             p.exposure_s,
+            p.code,
         )
         for p in plan.projectors
     )

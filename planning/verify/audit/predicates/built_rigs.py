@@ -78,12 +78,15 @@ def retriangulated(
     the ring that the known projector draws where the true one lights it.
     """
     drawn = _drawn(projector, unknown[0], points)
-    rings = projector.ring_coordinate(drawn)
-    rings = rings + ring_m * np.linalg.norm(projector.ring_gradient(drawn), axis=1)
     pose, device = camera.world_from_device, camera.device
     seen = in_frame(_off(pose, unknown[1]), points)
     pixels = _shifted(pixels_of(device, seen), device, unknown[1]) + edge_px
     rays = in_world(pose, rays_of(device, pixels))
+    if projector.code is not None:
+        light, _ = projector.light.to_points(drawn)
+        return pose[:3, 3] + _met(drawn - pose[:3, 3], rays, light, ring_m) * rays
+    rings = projector.ring_coordinate(drawn)
+    rings = rings + ring_m * np.linalg.norm(projector.ring_gradient(drawn), axis=1)
     reach = np.linalg.norm(points - pose[:3, 3], axis=1)
     step = np.zeros_like(reach)
     for _ in range(_STEPS):
@@ -95,6 +98,19 @@ def retriangulated(
         reach = reach - step
     reach[np.abs(step) > _SETTLED] = np.nan
     return pose[:3, 3] + reach[:, None] * rays
+
+
+def _met(way: Array, rays: Array, light: Array, off_m: Array) -> Array:
+    """Return how far along rays the closest approach to lines of light lies, (n, 1).
+
+    The lines pass the places that lie `way` from where the rays begin, moved by `off_m`
+    towards where the rays go.
+    """
+    c = dot(rays, light)
+    square = 1.0 - c * c
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along = (dot(way, rays) - c * dot(way, light)) / square
+        return (along + off_m / np.sqrt(square))[:, None]
 
 
 def _drawn(projector: AuditProjector, unknown: Array, points: Array) -> Array:

@@ -1,6 +1,7 @@
 """What a pair of projector and camera measures of each sample, and how exactly.
 
-A point lies where its viewing ray meets its ring surface. With w = N - m (N.r) / (m.r)
+A point lies where its viewing ray meets its ring surface; of coded pixels, the plane of
+their light that the ray crosses most squarely. With w = N - m (N.r) / (m.r)
 it moves along the normal by w.dX if its ray moves by dX there, and by (m.dY) (N.r) /
 (m.r) if the surface moves by dY: each error of a device is one of either.
 """
@@ -11,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from geometry.arrays import Array, cross
+from planning.model.light.dense_code import DenseCode
 from planning.model.light.drawn_edges import DrawnEdges
 from planning.model.light.light_budget import LightBudget
 from planning.model.requirements import TriangulationLimits
@@ -20,7 +22,7 @@ from .audit_devices import AuditCamera, AuditProjector
 from .audit_optics import dot, in_frame, lens_shifts, pixel_gradient, towards
 from .light_levels import LightLevels
 
-NOISE_TERMS = ("edges", "light", "rings", "linearity")
+NOISE_TERMS = ("edges", "light", "phase", "rings", "linearity")
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,14 +30,15 @@ class PairGeometry:
     """A pair at n samples, each (n,) or (n, 3).
 
     Attributes:
-        m: Unit normals of the ring surfaces.
+        m: Unit normals of the surfaces of equal code.
         w: What an error of a viewing ray moves the point by, along the normal.
-        levers: (N.r) / (m.r), what an error of a ring surface moves it by.
+        levers: (N.r) / (m.r), what an error of such a surface moves it by.
         per_px: What an edge that is off by 1 px does along the normal [m/px].
         incidence: -N.L.
         normals: N.
         conditioning: |r.m|.
-        pitch: Of neighbouring rings in the image [px].
+        pitch: Of neighbouring rings in the image [px]; inf: there are none.
+        met: Angle between ray and light [rad].
     """
 
     projector: AuditProjector
@@ -49,6 +52,7 @@ class PairGeometry:
     normals: Array
     conditioning: Array
     pitch: Array
+    met: Array
 
     @classmethod
     def of(
@@ -59,27 +63,39 @@ class PairGeometry:
         light, _ = projector.light.to_points(points)
         r, t = towards(points, camera.world_from_device[:3, 3])
         with np.errstate(divide="ignore", invalid="ignore"):
-            gradient = projector.ring_gradient(points)
-            steepness = np.linalg.norm(gradient, axis=1)
-            m = gradient / steepness[:, None]
+            m, spacing = _surfaces(projector, points, light, r)
             levers = dot(normal, r) / dot(m, r)
             w = normal - m * levers[:, None]
             turn = camera.world_from_device[:3, :3]
             local = in_frame(camera.world_from_device, points)
             g = np.linalg.norm(pixel_gradient(camera.device, local, w @ turn), axis=1)
-            gap = projector.ring_gap(projector.ring_coordinate(points))
-            pitch = gap / steepness * np.abs(levers) / (t * g)
+            pitch = spacing * np.abs(levers) / (t * g)
         return cls(
             *(projector, camera, points, m, w, levers, t * g),
             *(-dot(normal, light), normal),
             np.abs(dot(r, m)),
             pitch,
+            np.arctan2(np.linalg.norm(cross(light, r), axis=1), dot(light, r)),
         )
 
     def levels(self, light: LightBudget) -> LightLevels:
         """Return how bright the samples come out in the camera."""
         levels = LightLevels.of(light, self.projector, self.points, self.normals)
         return levels.seen(self.camera, self.points)
+
+
+def _surfaces(
+    projector: AuditProjector, points: Array, light: Array, rays: Array
+) -> tuple[Array, Array]:
+    """Return m (n, 3), and how far rings are apart along it (n,) [m]; inf: no rings."""
+    if projector.code is not None:
+        across = cross(light, cross(rays, light))
+        across = across / np.linalg.norm(across, axis=1)[:, None]
+        return across, np.full(len(points), np.inf)
+    gradient = projector.ring_gradient(points)
+    steepness = np.linalg.norm(gradient, axis=1)
+    gap = projector.ring_gap(projector.ring_coordinate(points))
+    return gradient / steepness[:, None], gap / steepness
 
 
 def deviation(terms: dict[str, Array], names: Iterable[str] | None = None) -> Array:
@@ -92,7 +108,11 @@ def error_terms(pair: PairGeometry, limits: TriangulationLimits) -> dict[str, Ar
     """Return independent parts of the deviation along the normal [m], (n,) each."""
     with np.errstate(divide="ignore", invalid="ignore"):
         terms = {"edges": limits.noise_px / pair.incidence * pair.per_px}
-        if limits.light is not None:
+        if pair.projector.code is not None:
+            _, pixel_m = _panel_shifts(pair)
+            told = told_px(pair, pair.projector.code, limits)
+            terms["phase"] = told * pixel_m * np.abs(pair.levers)
+        elif limits.light is not None:
             terms["light"] = light_noise_px(pair, limits) * pair.per_px
         if limits.ring_sigma_m is not None:
             terms["rings"] = limits.ring_sigma_m * np.abs(pair.levers)
@@ -132,6 +152,20 @@ def light_noise_px(pair: PairGeometry, limits: TriangulationLimits) -> Array:
     ramp = side**2 * (4.0 + 1.0 + 1.0) / 12.0
     across = pair.per_px / np.abs(pair.levers)
     return pair.levels(limits.light).noise_px(np.sqrt(blur + ramp) / across)
+
+
+def told_px(pair: PairGeometry, code: DenseCode, limits: TriangulationLimits) -> Array:
+    """Return how exactly a code is told, in pixels of the panel, shape (n,)."""
+    if code.shifts == 0:
+        return np.full(len(pair.points), 12.0**-0.5)
+    side, variance = _blur(pair, limits.drawn_edges or DrawnEdges())
+    waves = np.pi * np.sqrt(variance) / (side * code.period_px)
+    left = np.exp(-2.0 * waves**2)
+    if limits.light is None:
+        radians = code.phase_noise / pair.incidence / left
+    else:
+        radians = pair.levels(limits.light).phase_noise(code.shifts) / left
+    return radians / (2.0 * np.pi / code.period_px)
 
 
 def drawn_off(pair: PairGeometry, drawn: DrawnEdges) -> Array:

@@ -61,12 +61,22 @@ class LightLevels:
         """Grey levels between lit and dark surface of the least albedo, (n,)."""
         return self.grey(self.light.albedo[0] * (self.lit - self.dark))
 
-    def noise_px(self, blur_px: Array) -> Array:
-        """Return the noise of edges blurred by so much [px], (n,)."""
+    @property
+    def _half_lit(self) -> Array:
+        """Noise of a pixel between lit and dark [electrons], (n,)."""
         light = self.light
         half = light.albedo[0] * (self.lit + self.dark) / 2.0
         level = light.full_well_e / light.gain / (2.0**light.bits - 1.0)
-        noise = np.sqrt(half + light.read_noise_e**2 + level**2 / 12.0)
+        return np.sqrt(half + light.read_noise_e**2 + level**2 / 12.0)
+
+    def phase_noise(self, shifts: int) -> Array:
+        """Return the noise of the phase of so many unblurred sinusoids [rad], (n,)."""
+        amplitude = self.light.albedo[0] * (self.lit - self.dark) / 2.0
+        return np.sqrt(2.0 / shifts) * self._half_lit / np.maximum(amplitude, 1e-9)
+
+    def noise_px(self, blur_px: Array) -> Array:
+        """Return the noise of edges blurred by so much [px], (n,)."""
+        light, noise = self.light, self._half_lit
         steepness = light.albedo[0] * (self.lit - self.dark) / np.sqrt(2.0 * np.pi)
         # Frame less inverse: the noise of two over a slope twice as steep; and as much
         # as two pixels weighed evenly by all places between them have.

@@ -26,6 +26,7 @@ LIGHT_CAUSES = (
     "projector_range",
     "projector_incidence",
     "tangent_angle",
+    "pixel_distance",
     "projector_occlusion",
     "projector_body",
     "blocked_by_obstacle",
@@ -39,7 +40,7 @@ SIGHT_CAUSES = (
     "blocked_by_obstacle",
     "sample_distance",
 )
-PAIR_CAUSES = ("too_dark", "clipped", "conditioning", "sigma", "pitch")
+PAIR_CAUSES = ("too_dark", "clipped", "conditioning", "angle", "sigma", "pitch")
 LIT, SEEN = len(LIGHT_CAUSES), len(SIGHT_CAUSES)
 MEASURED = SEEN + len(PAIR_CAUSES)
 OCCLUDED = LIGHT_CAUSES.index("projector_occlusion")
@@ -63,9 +64,18 @@ def light_steps(
         (length >= near) & (length <= far),
         -dot(samples.normals, along) >= np.cos(limits.max_incidence),
         np.abs(dot(samples.steep, along)) <= np.cos(limits.min_tangent_angle),
+        _pixels_on(projector, samples, along)
+        <= _or(limits.max_sample_distance_m, np.inf),
     )
     _pass_free(steps, OCCLUDED, projector, samples, (along, length), shadow)
     return steps
+
+
+def _pixels_on(projector: AuditProjector, samples: AuditSamples, along: Array) -> Array:
+    """Return how wide the panel's pixels come out on the surface, shape (n,) [m]."""
+    z = in_frame(projector.world_from_device, samples.points)[:, 2]
+    squarely = np.maximum(-dot(samples.normals, along), 1e-9)
+    return projector.light.pixel_sides(z) / squarely
 
 
 def light_margin(
@@ -123,10 +133,10 @@ def pair_steps(
 def pair_figures(
     pair: PairGeometry, terms: dict[str, Array], limits: TriangulationLimits
 ) -> Array:
-    """Return what each limit of `PAIR_CAUSES` looks at, (5, n); NaN where unlimited.
+    """Return what each limit of `PAIR_CAUSES` looks at, (6, n); NaN where unlimited.
 
-    Grey levels between lit and dark, the brightest one, |r.m|, the deviation [m] and
-    the pitch [px].
+    Grey levels between lit and dark, the brightest one, |r.m|, the angle between ray
+    and light [rad], the deviation [m] and the pitch [px].
     """
     names = NOISE_TERMS if limits.accuracy_of == "noise" else None
     unsaid = np.full(len(pair.points), np.nan)
@@ -136,6 +146,7 @@ def pair_figures(
             unsaid if levels is None else levels.contrast,
             unsaid if levels is None else levels.brightest,
             pair.conditioning,
+            pair.met,
             deviation(terms, names),
             pair.pitch,
         ]
@@ -143,14 +154,15 @@ def pair_figures(
 
 
 def pair_holds(figures: Array, limits: TriangulationLimits) -> Mask:
-    """Return which limits of `PAIR_CAUSES` those figures keep, (5, n)."""
-    contrast, brightest, conditioning, sigma, pitch = figures
+    """Return which limits of `PAIR_CAUSES` those figures keep, (6, n)."""
+    contrast, brightest, conditioning, met, sigma, pitch = figures
     light, every = limits.light, np.ones(len(sigma), dtype=bool)
     return np.array(
         [
             every if light is None else contrast >= light.min_contrast,
             every if light is None else brightest < 254.5,
             conditioning >= limits.min_conditioning,
+            (met >= _or(limits.min_angle, 0.0)) & (met <= _or(limits.max_angle, np.pi)),
             sigma <= _or(limits.max_sigma_m, np.inf),
             pitch >= _or(limits.min_ring_pitch_px, -np.inf),
         ]

@@ -23,7 +23,9 @@ def reference_projectors(plan: RigPlan) -> tuple[AuditProjector, ...]:
     )
     return tuple(
         AuditProjector(
-            devices[model], pose, ring, last, bodies_about(plan, "projector", pose)
+            *(devices[model], pose, ring, last),
+            bodies_about(plan, "projector", pose),
+            code=plan.projectors[0].code,
         )
         for pose, ring, model in poses
     )

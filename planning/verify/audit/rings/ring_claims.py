@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from geometry.arrays import Array, Mask
-from planning.model.document.device_records import RingSharesRecord, RingsRecord
+from planning.model.document.ring_records import RingSharesRecord, RingsRecord
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.estimates import POINT, ROUNDING

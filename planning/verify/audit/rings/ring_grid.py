@@ -6,7 +6,7 @@ import numpy as np
 
 from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.topology import face_pairs
-from planning.model.document.device_records import CreasesRecord
+from planning.model.document.ring_records import CreasesRecord
 from planning.model.surface import Surface
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings

@@ -14,12 +14,8 @@ from planning.model.errors import CapturesError
 from planning.verify.reconstruction.arrays import Images
 from planning.verify.reconstruction.check.accuracy import Expected
 from planning.verify.reconstruction.check.result import PairCount, Reconstruction
-from planning.verify.reconstruction.decode.decode import (
-    Decoded,
-    PairIndex,
-    Pairs,
-    decode,
-)
+from planning.verify.reconstruction.decode.decode import Decoded, PairIndex, Pairs
+from planning.verify.reconstruction.decode.dense.dense_inspection import inspect_dense
 from planning.verify.reconstruction.decode.inspection import DarkError, inspect
 from planning.verify.reconstruction.faults.measured_clouds import rejection
 from planning.verify.reconstruction.faults.refine import refine, remeasured
@@ -29,6 +25,7 @@ from planning.verify.reconstruction.render.photometry import Photometry, assumed
 from planning.verify.reconstruction.render.rendered import (
     Progress,
     Spent,
+    decode_pair,
     decode_rendered,
     over_pairs,
 )
@@ -70,7 +67,10 @@ def reconstruct_rendered(
 
     Raises:
         OSError: If the images can't be written.
+        InputError: If a dense rig is to be mended.
     """
+    if mend:
+        plan.require_rings("--refine")
     threads = threads or n_threads()
     light, spent = photometry or assumed_light(plan), Spent()
     inspection = _Inspection(plan)
@@ -120,7 +120,10 @@ def reconstruct_captured(
 
     Raises:
         CapturesError: If the images of no pair can be used.
+        InputError: If a dense rig is to be mended.
     """
+    if mend:
+        folder.plan.require_rings("--refine")
     folder.require()
     plan, spent = folder.plan, Spent()
     inspection = _Inspection(plan)
@@ -132,7 +135,7 @@ def reconstruct_captured(
             if frames is None:
                 return Decoded.nothing()
             patterns = inspection.patterns(pair)
-            return decode(frames, patterns, known[pair], **plan.limits.decoder)
+            return decode_pair(frames, patterns, known[pair], plan.limits)
 
     pairs = over_pairs(plan, measure, threads=threads or n_threads(), progress=progress)
     inspection.require_some()
@@ -156,11 +159,19 @@ class _Inspection:
         """Return what may be decoded of a pair's images; None: nothing."""
         try:
             names = self._plan.frame_names(*pair)
-            frames, self._notes[pair] = inspect(read(), self.patterns(pair), names)
+            frames, self._notes[pair] = self._inspected(pair, read(), names)
         except CapturesError as error:
             self._refused[pair] = error
             return None
         return frames
+
+    def _inspected(
+        self, pair: PairIndex, stack: Images, names: tuple[str, ...]
+    ) -> tuple[Frames, tuple[str, ...]]:
+        dense = self._plan.projectors[pair[0]].dense
+        if dense is not None:
+            return inspect_dense(stack, dense, names)
+        return inspect(stack, self.patterns(pair), names)
 
     def require_some(self) -> None:
         """Refuse a folder of which no image is used.
@@ -214,7 +225,7 @@ class _Inspection:
         ):
             return None
         count = PairCount.of(self._plan, pair, decoded)
-        why = rejection((count,)) or "no ring edge was decoded"
+        why = rejection((count,)) or "nothing was decoded"
         return f"gave no point: {why} ({should})"
 
 

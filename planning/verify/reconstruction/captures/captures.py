@@ -64,7 +64,7 @@ class CaptureFolder:
                     f"{file}: {8 * image.itemsize} bits, {files[0].name} has "
                     f"{8 * levels[0].itemsize}; record all frames alike"
                 )
-        return _scaled(np.stack(levels))
+        return scaled(np.stack(levels))
 
     def write(self, p: int, c: int, stack: NDArray[np.uint8]) -> None:
         """Write the images of a pair as 8-bit PNG."""
@@ -116,7 +116,7 @@ def whole_image(frames: Frames, resolution: tuple[int, int]) -> Images:
     return stack
 
 
-def _scaled(stack: NDArray[np.uint8 | np.uint16]) -> Images:
+def scaled(stack: NDArray[np.uint8 | np.uint16]) -> Images:
     """Bring 16-bit files to levels of 0 to 255, by the bits that the sensor used."""
     if stack.dtype == np.uint8:
         return stack.astype(np.uint8, copy=False)

@@ -7,7 +7,7 @@ move the point along its normal by::
     N.(dX - r (grad R . dX) / (grad R . r)),    N.r dR / (grad R . r)
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import TypeVar
 
@@ -18,7 +18,6 @@ from planning.model.calibration_errors import CalibrationErrors
 from planning.verify.reconstruction.arrays import Array
 from planning.verify.reconstruction.calibration import (
     CameraCalibration,
-    PairCalibration,
     ProjectorCalibration,
 )
 from planning.verify.reconstruction.cloud import Cloud
@@ -44,14 +43,25 @@ def calibration_sigma(cloud: Cloud, normals: Array, scanner: Scanner) -> Array:
         return sigma
     known = np.isfinite(normals[:, :1])
     towards = np.where(known, normals, -cloud.rays)
+    of_rings, n_cameras = cloud.ring >= 0, len(scanner.cameras)
     for (p, c), pair in scanner.pairs():
-        rows = np.flatnonzero((cloud.projector == p) & (cloud.camera == c))
-        of = [9 * k + np.arange(9) for k in (c, len(scanner.cameras) + p)]
-        own = np.concatenate(of)
-        if len(rows):
-            sigma[rows] = _of_pair(
-                cloud.take(rows), towards[rows], pair, covariance[np.ix_(own, own)]
-            )
+        own = (cloud.projector == p) & (cloud.camera == c) & (cloud.ring > -2)
+        devices = [9 * k + np.arange(9) for k in (c, n_cameras + p)]
+        for some, measure in ((of_rings, _of_pair), (~of_rings, _of_codes)):
+            rows = np.flatnonzero(own & some)
+            if len(rows):
+                both = np.ix_(np.concatenate(devices), np.concatenate(devices))
+                two = (pair.camera, pair.projector)
+                part = cloud.take(rows), towards[rows]
+                sigma[rows] = measure(*part, *two, covariance[both])
+    for c, camera in enumerate(scanner.cameras):
+        for k, second in enumerate(scanner.cameras):
+            rows = np.flatnonzero((cloud.camera == c) & (cloud.by_camera == k))
+            if len(rows):
+                both = np.concatenate([9 * i + np.arange(9) for i in (c, k)])
+                part = cloud.take(rows), towards[rows]
+                among = covariance[np.ix_(both, both)]
+                sigma[rows] = _of_codes(*part, camera, second, among)
     return sigma
 
 
@@ -83,31 +93,94 @@ def _deviations(errors: CalibrationErrors) -> Array:
 
 
 def _of_pair(
-    cloud: Cloud, normals: Array, pair: PairCalibration, covariance: Array
+    cloud: Cloud,
+    normals: Array,
+    camera: CameraCalibration,
+    projector: ProjectorCalibration,
+    covariance: Array,
 ) -> Array:
-    """Standard deviation by the errors of camera and projector, (18, 18)."""
+    """Standard deviation of ring points by camera and projector, (18, 18)."""
+    ring = projector.ring_coordinate
+
+    def told(off: ProjectorCalibration) -> Array:
+        pixels, _ = off.panel(cloud.points)
+        return np.linalg.norm(projector.ring_plane(pixels), axis=1)
+
+    return _moved(cloud, normals, camera, projector, covariance, ring, told)
+
+
+def _of_codes(
+    cloud: Cloud,
+    normals: Array,
+    camera: CameraCalibration,
+    second: _Device,
+    covariance: Array,
+) -> Array:
+    """Standard deviation of coded points by camera and second device, (18, 18).
+
+    What tells the depth is where a point is on the second device's image along its
+    epipolar line.
+    """
+    line = _seen(second, cloud.points + _STEP_M * cloud.rays)
+    line -= _seen(second, cloud.points - _STEP_M * cloud.rays)
+    line /= np.linalg.norm(line, axis=1)[:, None]
+
+    def along(points: Array) -> Array:
+        return np.einsum("ij,ij->i", line, _seen(second, points))
+
+    def told(off: _Device) -> Array:
+        return np.einsum("ij,ij->i", line, _seen(off, cloud.points))
+
+    return _moved(cloud, normals, camera, second, covariance, along, told)
+
+
+def _seen(device: CameraCalibration | ProjectorCalibration, points: Array) -> Array:
+    """Pixels (n, 2) of points (n, 3) in the image of a device."""
+    if isinstance(device, CameraCalibration):
+        return device.project(points)
+    return device.panel(points)[0]
+
+
+def _moved(
+    cloud: Cloud,
+    normals: Array,
+    camera: CameraCalibration,
+    second: _Device,
+    covariance: Array,
+    coordinate: Callable[[Array], Array],
+    told: Callable[[_Device], Array],
+) -> Array:
+    """Standard deviation by the errors of two devices, (18, 18).
+
+    Args:
+        cloud: Points of both.
+        normals: Along which, shape (n, 3).
+        camera: Whose viewing rays they lie on.
+        second: That tells where.
+        covariance: Of the errors of both.
+        coordinate: What the second one measures of points (n, 3).
+        told: What a second one with an error would say of the points.
+    """
     points, rays = cloud.points, cloud.rays
-    ring = pair.projector.ring_coordinate
     gradient = np.column_stack(
         [
-            (ring(points + axis) - ring(points - axis)) / (2.0 * _STEP_M)
+            (coordinate(points + axis) - coordinate(points - axis)) / (2.0 * _STEP_M)
             for axis in _STEP_M * np.eye(3)
         ]
     )
     along = np.einsum("ij,ij->i", gradient, rays)
     facing = np.einsum("ij,ij->i", normals, rays)
-    reach = np.linalg.norm(points - pair.camera.centre, axis=1)[:, None]
+    reach = np.linalg.norm(points - camera.centre, axis=1)[:, None]
     steps = _SHARE * np.sqrt(np.diag(covariance))
     moves: list[Array] = []
-    for camera in _off(pair.camera, steps[:9]):
-        moved = camera.centre - pair.camera.centre
-        moved = moved + reach * (camera.rays(cloud.pixels) - rays)
+    for off in _off(camera, steps[:9]):
+        moved = off.centre - camera.centre
+        moved = moved + reach * (off.rays(cloud.pixels) - rays)
         slid = facing * np.einsum("ij,ij->i", gradient, moved) / along
         moves.append(np.einsum("ij,ij->i", normals, moved) - slid)
-    for projector in _off(pair.projector, steps[9:]):
-        pixels, _ = projector.panel(points)
-        drawn = np.linalg.norm(pair.projector.ring_plane(pixels), axis=1)
-        moves.append(facing * (drawn - ring(points)) / along)
+    known = coordinate(points)
+    for off in _off(second, steps[9:]):
+        moves.append(facing * (told(off) - known) / along)
     by_unit = np.stack(moves, axis=1) / np.where(steps > 0.0, steps, 1.0)
     variance = np.einsum("ij,jk,ik->i", by_unit, covariance, by_unit)
     return np.sqrt(np.maximum(variance, 0.0))

@@ -1,7 +1,8 @@
 """`cloud.ply` and `deviation.ply`: points coloured by uncertainty, or by deviation.
 
 Positions are in the unit and axes of the mesh file, so that both lie on each other in
-any viewer; the header's comments say so and give the scale to metres.
+any viewer; the header's comments say so and give the scale to metres. Without a mesh
+they are in a camera's axes.
 """
 
 from dataclasses import dataclass, replace
@@ -99,6 +100,7 @@ class CloudFile:
         limits: That at both ends of the colour scale, in that unit.
         digest: Of the plan by which it was measured.
         notes: What else the header says.
+        axes: Whose axes positions are in.
     """
 
     rows: NDArray[np.void]
@@ -107,6 +109,7 @@ class CloudFile:
     limits: tuple[float, float]
     digest: str = ""
     notes: tuple[str, ...] = ()
+    axes: str = "the mesh"
 
     @classmethod
     def of(cls, merged: Merged, unit: LengthUnit, digest: str = "") -> "CloudFile":
@@ -183,7 +186,7 @@ class CloudFile:
             "ply",
             "format binary_little_endian 1.0",
             _GENERATOR,
-            f"comment unit {self.unit.name}, {self.unit.in_m!r} m; axes of the mesh",
+            f"comment unit {self.unit.name}, {self.unit.in_m!r} m; axes of {self.axes}",
             *([f"comment plan {self.digest}"] if self.digest else []),
             f"comment {self.scale.column}: {self.scale.words}, same unit",
             f"comment colour {self.scale.name} by {self.scale.column}, {low:.6g} to "

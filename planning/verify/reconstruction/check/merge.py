@@ -18,9 +18,10 @@ from planning.verify.reconstruction.decode.lit_image import LitImage
 from planning.verify.reconstruction.scanner import Scanner
 
 from .calibration_sigma import calibration_sigma, camera_px
+from .dense_merge import merge_dense
 from .overlaps import compare_overlaps, pixel_sizes
-from .point_sigma import Sigmas
-from .ring_curves import RingCurves
+from .rings.point_sigma import Sigmas
+from .rings.ring_curves import RingCurves
 
 # Points of two projectors are of one spot in a cell so large [px].
 _SPOT_PX = 1.5
@@ -66,6 +67,56 @@ class Merged:
 
 
 def merge(
+    cloud: Cloud, plan: Scanner, lit: Mapping[PairIndex, LitImage], *, pitch_px: float
+) -> Merged:
+    """Remove false and redundant points, and average what remains.
+
+    Points of rings along these, and those of coded pixels in cells: see `merge_rings`
+    and `merge_dense`. Arguments are as of `merge_rings`.
+    """
+    coded = cloud.ring < 0
+    if not coded.any():
+        return merge_rings(cloud, plan, lit, pitch_px=pitch_px)
+    dense = _dense_part(cloud.take(coded), plan)
+    if coded.all():
+        return dense
+    rings = merge_rings(cloud.take(~coded), plan, lit, pitch_px=pitch_px)
+    return _in_order(rings, dense, coded)
+
+
+def _dense_part(cloud: Cloud, plan: Scanner) -> Merged:
+    """Merge points of coded pixels."""
+    found = merge_dense(cloud, plan, cell_m=plan.limits.dense.spacing_m)
+    return Merged(
+        found.cloud,
+        found.stays,
+        np.zeros(len(cloud), dtype=bool),
+        found.shared,
+        found.normals,
+        found.sigma,
+        calibration_sigma(found.cloud, found.normals, plan),
+    )
+
+
+def _in_order(rings: Merged, dense: Merged, coded: Mask) -> Merged:
+    """Bring points of both kinds into the order in which they were measured."""
+    joined = rings.joined(dense)
+    place = np.concatenate([np.flatnonzero(~coded), np.flatnonzero(coded)])
+    masks = {}
+    for name in ("stays", "steps", "shared"):
+        masks[name] = np.zeros(len(coded), dtype=bool)
+        masks[name][place] = getattr(joined, name)
+    order = np.argsort(place[joined.stays])
+    return Merged(
+        joined.cloud.take(order),
+        **masks,
+        normals=joined.normals[order],
+        sigma=joined.sigma[order],
+        calibration=joined.calibration[order],
+    )
+
+
+def merge_rings(
     cloud: Cloud, plan: Scanner, lit: Mapping[PairIndex, LitImage], *, pitch_px: float
 ) -> Merged:
     """Remove false and redundant points, and average what remains along its rings.

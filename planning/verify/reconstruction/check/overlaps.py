@@ -70,6 +70,7 @@ def pixel_sizes(cloud: Cloud, plan: Scanner) -> Array:
 
 def ring_pitch_px(cloud: Cloud, plan: Scanner) -> float:
     """Median distance of neighbouring rings in images [px]."""
+    cloud = cloud.take(cloud.ring >= 0)
     if len(cloud) == 0:
         return 1.0
     gaps = np.empty(len(cloud))

@@ -117,9 +117,12 @@ class Reconstruction:
         """What merging did, in words."""
         shared = share_of(self.merged.shared)
         redundant = self.redundant_fraction - self.step_fraction
+        where = "in the light of two projectors"
+        if np.any(self.everything.ring < 0):
+            where = "where others measured, too"
         return (
-            f"{self.n_merged} points of {self.n_points}, {shared:.1%} of them in the "
-            f"light of two projectors; {redundant:.1%} redundant, "
+            f"{self.n_merged} points of {self.n_points}, {shared:.1%} of them {where}; "
+            f"{redundant:.1%} redundant, "
             f"{self.step_fraction:.1%} false at steps"
             + f"; {self.inside_fraction:.1%} on the inside of the open mesh, not judged"
             * (self.inside_fraction > 0.0)

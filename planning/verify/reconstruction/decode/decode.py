@@ -10,6 +10,7 @@ from planning.verify.reconstruction.calibration import PairCalibration
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
 
+from .code_map import CodeMap
 from .edges import SATURATED, ImageEdges, find_edges
 from .lit_image import LitImage
 from .ring_chains import chains
@@ -64,6 +65,10 @@ class Decoded:
         n_saturated: Pixels that the white frame saturates.
         saturated: Some of them, (u, v) in the camera's image, shape (k, 2).
         lit: Which pixels show which annulus.
+        codes: Which pixels show which pixel of a projector that codes them; None: it
+            shows rings, or nothing.
+        residual_px: Median distance at which rays of both devices pass each other
+            [px of the projector]; NaN: of rings.
     """
 
     cloud: Cloud
@@ -75,6 +80,8 @@ class Decoded:
     n_saturated: int
     saturated: Array
     lit: LitImage
+    codes: CodeMap | None = None
+    residual_px: float = np.nan
 
     def with_rings(self, numbers: Indices) -> "Decoded":
         """Return this with the rings numbered anew, as a table of them says, (n,)."""
@@ -83,6 +90,20 @@ class Decoded:
             self,
             cloud=replace(self.cloud, ring=numbers[self.cloud.ring].astype(np.int16)),
             edges=replace(self.edges, rings=rings),
+        )
+
+    def with_camera(self, cloud: Cloud, k: int, n_asked: int) -> "Decoded":
+        """Return this with points that camera k measured by the same codes, too.
+
+        Of so many pixels; the others count as left out, as `other_camera`.
+        """
+        ring = np.full(len(cloud), -2 - k, dtype=np.int16)
+        lost = self.rejected.get("other_camera", 0) + n_asked - len(cloud)
+        return replace(
+            self,
+            cloud=Cloud.join([self.cloud, replace(cloud, ring=ring)]),
+            n_edges=self.n_edges + n_asked,
+            rejected=self.rejected | {"other_camera": lost},
         )
 
     @classmethod

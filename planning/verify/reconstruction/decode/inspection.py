@@ -53,10 +53,10 @@ def inspect(
         CapturesError: If the images contradict each other or the patterns.
         DarkError: If there is no light.
     """
-    window, corner = _lit_part(stack)
-    lit = _lit(window)
-    clipped = _clipped(window, lit, names)
-    _require_different(window, lit, names)
+    window, corner = lit_part(stack)
+    lit = lit_pixels(window)
+    clipped = clipped_pixels(window, lit, names)
+    require_different(window, lit, names)
     good = lit & ~clipped
     curved = bent(window, good)
     if is_bent(curved):
@@ -64,9 +64,9 @@ def inspect(
     broken = broken_pixels(window, good, names)
     _require_codes(window, good & ~broken, patterns)
     reasons = (
-        (_share(clipped, lit), "are clipped and left out"),
+        (share_of_lit(clipped, lit), "are clipped and left out"),
         (
-            _share(broken, good),
+            share_of_lit(broken, good),
             "are left out: frames and inverses there don't add up to white and black",
         ),
     )
@@ -88,7 +88,7 @@ def inspect(
     return Frames(frames, corner), notes
 
 
-def _lit(stack: Images) -> Mask:
+def lit_pixels(stack: Images) -> Mask:
     """Pixels that get light: in white, or in the first bits and their inverses."""
     # Two bits: a single damaged frame lights nothing. What is isolated is noise.
     black = stack[1].astype(np.float32)
@@ -102,13 +102,14 @@ def _contrast(stack: Images) -> Grey:
     return np.subtract(stack[0], stack[1], dtype=np.float32)
 
 
-def _share(some: Mask, whole: Mask) -> float:
+def share_of_lit(some: Mask, whole: Mask) -> float:
+    """Return the share of the whole that some of it is; 0 of nothing."""
     return float(np.count_nonzero(some & whole) / max(1, np.count_nonzero(whole)))
 
 
-def _lit_part(stack: Images) -> tuple[Images, tuple[int, int]]:
+def lit_part(stack: Images) -> tuple[Images, tuple[int, int]]:
     """Return the part of the images that holds all lit pixels, and its corner."""
-    contrast, lit = _contrast(stack), _lit(stack)
+    contrast, lit = _contrast(stack), lit_pixels(stack)
     n_lit = int(np.count_nonzero(contrast >= MIN_CONTRAST))
     n_below = int(np.count_nonzero(contrast <= -MIN_CONTRAST))
     # Noise brightens about as many as it darkens.
@@ -132,14 +133,14 @@ def _lit_part(stack: Images) -> tuple[Images, tuple[int, int]]:
     return stack[:, top:bottom, left:right], (left, top)
 
 
-def _clipped(stack: Images, lit: Mask, names: Sequence[str]) -> Mask:
+def clipped_pixels(stack: Images, lit: Mask, names: Sequence[str]) -> Mask:
     """Pixels in which any frame reaches what the sensor can tell apart at most."""
     level = min(_CLIPPED, _piled_level(stack[0]))
     clipped = stack.max(axis=0) >= level
-    share = _share(clipped, lit)
+    share = share_of_lit(clipped, lit)
     if share <= _MOST_CLIPPED:
         return clipped
-    by_frame = [_share(image >= level, lit) for image in stack]
+    by_frame = [share_of_lit(image >= level, lit) for image in stack]
     worst = int(np.argmax(by_frame))
     if by_frame[worst] > 2.0 * by_frame[0]:
         raise CapturesError(
@@ -160,7 +161,7 @@ def _piled_level(white: Images) -> float:
     return float(levels[-1])
 
 
-def _require_different(stack: Images, lit: Mask, names: Sequence[str]) -> None:
+def require_different(stack: Images, lit: Mask, names: Sequence[str]) -> None:
     """Refuse two frames of the same pixels, unless both are white or black all over.
 
     Without noise a bit that is the same everywhere equals white or black, and so does

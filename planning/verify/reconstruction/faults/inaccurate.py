@@ -87,7 +87,7 @@ def wrong_roots(plan: Scanner, decoded: Pairs) -> list[str]:
     words: list[str] = []
     for (p, c), pair in decoded:
         cloud = pair.cloud.thinned(_POINTS_A_PAIR)
-        if len(cloud) == 0:
+        if len(cloud) == 0 or plan.projectors[p].dense is not None:
             continue
         radii = plan.projectors[p].pattern.radii[cloud.ring]
         evidence = replace(Evidence.at(cloud.pixels, p, c), radii=radii)

@@ -26,16 +26,32 @@ REJECTED = {
     "isolated": "the edges are scattered: little light, or nearly hidden",
     "depth_step": "the edges hang between surfaces, or the surface is too slanted",
 }
+# Of coded pixels; what has the same name as of edges means the same.
+CODES_REJECTED = {
+    "mixed": "the pixels show several codes at once: blurred stripes, steps, or frames "
+    "out of order",
+    "modulation": "the sinusoids hardly stand out: little light, or defocus",
+    "partly_lit": "the pixels lie on the border of the light",
+    "residual": "the rays of both devices pass each other: a pose or lens isn't that "
+    "of the plan",
+    "angle": "the triangulation angle is outside its limits",
+    "unsure": "noise moves the points too far",
+    "other_camera": "no other camera shows their codes, or its rays meet theirs beyond "
+    "the limits",
+}
 
 
 def rejection(pairs: tuple[PairCount, ...]) -> str | None:
     """Return in words what most edges of pairs were left out for, None without any."""
-    count = {cause: sum(p.rejected.get(cause, 0) for p in pairs) for cause in REJECTED}
-    cause = max(REJECTED, key=lambda name: count[name])
+    words = REJECTED | CODES_REJECTED
+    count = {cause: sum(p.rejected.get(cause, 0) for p in pairs) for cause in words}
+    cause = max(words, key=lambda name: count[name])
     if not count[cause]:
         return None
-    n_edges = sum(pair.n_edges for pair in pairs)
-    return f"{count[cause]} of {n_edges} edges left out as `{cause}`, {REJECTED[cause]}"
+    n_edges, what = sum(pair.n_edges for pair in pairs), "edges"
+    if any("mixed" in pair.rejected for pair in pairs):
+        what = "pixels"
+    return f"{count[cause]} of {n_edges} {what} left out as `{cause}`, {words[cause]}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -155,14 +155,16 @@ def _no_edges(supposed: Supposed, points: Array, normals: Array) -> str:
 def light_falls(
     projector: ProjectorCalibration, caster: RayCaster, points: Array, normals: Array
 ) -> Mask:
-    """Return whether a projector's rings light points [m] of the surface, shape (n,).
+    """Return whether a projector's pattern lights points [m] of the surface, (n,).
 
     By ray casting; points and unit normals have shape (n, 3).
     """
     pixels, depth = projector.panel(points)
     with np.errstate(invalid="ignore", divide="ignore"):
-        drawn = projector.ring_coordinate(points) <= projector.pattern.outer_radius
-        lit = projector.in_panel(pixels) & (depth > 0.0) & drawn
+        lit = projector.in_panel(pixels) & (depth > 0.0)
+        if projector.dense is None:
+            rho = projector.ring_coordinate(points)
+            lit &= rho <= projector.pattern.outer_radius
     lit &= projector.incidence_cosine(points, normals) > _GLANCING
     starts, beams, reach = projector.aim(points[lit])
     lit[lit] = ~caster.occluded(starts, beams, reach * (1.0 - SHADOW_SLACK))

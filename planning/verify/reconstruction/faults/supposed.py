@@ -18,7 +18,8 @@ from planning.verify.reconstruction.calibration import (
     CameraCalibration,
     ProjectorCalibration,
 )
-from planning.verify.reconstruction.decode.decode import Pairs
+from planning.verify.reconstruction.decode.code_map import CodeMap
+from planning.verify.reconstruction.decode.decode import PairIndex, Pairs
 from planning.verify.reconstruction.scanner import Scanner
 
 Role = Literal["cameras", "projectors", "objects"]
@@ -30,6 +31,8 @@ _EDGES_A_PAIR, _EDGES = 400, 20_000
 GRAZING = np.deg2rad(70.0)
 # Pairs with fewer edges say nothing.
 _LEAST_EDGES = 60
+# Codes of neighbours that differ by less aren't of a surface [px of the projector].
+_LEAST_SLOPE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +91,9 @@ class Supposed:
 
 @dataclass(frozen=True, eq=False)
 class Evidence(Columns):
-    """Some labelled edges of every pair of devices.
+    """Some labelled edges of every pair of devices, or coded pixels.
+
+    A coded pixel lies on the ring about the projector's axis that its code is on.
 
     Attributes:
         pixels: Sub-pixel positions (u, v), shape (n, 2).
@@ -123,6 +128,8 @@ class Evidence(Columns):
         parts = [cls.at(np.zeros((0, 2)), 0, 0)]
         for (p, c), pair in decoded:
             edges = pair.edges
+            if pair.codes is not None:
+                parts.append(cls.coded(plan, pair.codes, (p, c), most))
             if len(edges) < _LEAST_EDGES or pair.rejected.get("labels", 0):
                 continue
             some = np.linspace(0, len(edges) - 1, min(most, len(edges)))
@@ -131,6 +138,22 @@ class Evidence(Columns):
             at = cls.at(edges.pixels[some], p, c)
             parts.append(replace(at, radii=radii, noise_px=edges.noise_px[some]))
         return cls.join(parts)
+
+    @classmethod
+    def coded(cls, plan: Scanner, codes: CodeMap, pair: PairIndex, most: int) -> Self:
+        """Take coded pixels of a pair, evenly; none where hardly any is."""
+        (p, c), told = pair, codes.told
+        if len(told) < _LEAST_EDGES:
+            return cls.at(np.zeros((0, 2)), p, c)
+        told = told[np.linspace(0, len(told) - 1, min(most, len(told))).astype(int)]
+        shown = codes.codes.reshape(-1, 2)[told].astype(np.float64)
+        sigma_px = codes.sigma.reshape(-1, 2)[told].max(axis=1).astype(np.float64)
+        on_plane = plan.projectors[p].ring_plane(shown)
+        return replace(
+            cls.at(codes.pixels(told), p, c),
+            radii=np.linalg.norm(on_plane, axis=1),
+            noise_px=sigma_px / max(codes.per_pixel, _LEAST_SLOPE),
+        )
 
 
 def places(evidence: Evidence, supposed: Supposed) -> Places:

@@ -17,7 +17,7 @@ from planning.model.planned import code_bits
 from planning.verify.reconstruction.arrays import Array, Grey, Images, Indices, Mask
 from planning.verify.reconstruction.light_laws import LightLaw
 
-Kind = Literal["white", "black", "bit", "root"]
+Kind = Literal["white", "black", "bit", "root", "phase"]
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,8 @@ class Frame:
 
     Attributes:
         number: Place in the sequence, from 0.
-        kind: `white`, `black`, a `bit` of the annulus index, or a camera's `root` disc.
+        kind: `white`, `black`, a `bit` of the annulus index or a pixel's stripe, a
+            camera's `root` disc, or a sinusoid of a `phase`.
         bit: Which bit, from 0 for the one that flips most often; None for the others.
         camera: Whose root disc; None for the others.
         inverse: Bright and dark exchanged, within what is drawn at all.

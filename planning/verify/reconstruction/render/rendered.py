@@ -7,15 +7,18 @@ from threading import Lock
 
 from geometry.parallel import abandonable
 from geometry.rays.rays import RayCaster
+from planning.verify.reconstruction.calibration import PairCalibration
 from planning.verify.reconstruction.decode.decode import (
     Decoded,
     PairIndex,
     Pairs,
     decode,
 )
+from planning.verify.reconstruction.decode.dense.dense_decode import decode_dense
 from planning.verify.reconstruction.patterns.ring_patterns import Frames, RingsForCamera
-from planning.verify.reconstruction.scanner import Scanner
+from planning.verify.reconstruction.scanner import ScanLimits, Scanner
 
+from .dense_render import render_dense
 from .lamp import Lamp
 from .occluders import obstacles_of
 from .photometry import Photometry
@@ -108,19 +111,33 @@ def decode_rendered(
                 return Decoded.nothing()
             others = [other for k in beside[p] if (other := shown(k, c)) is not None]
             lens = scene.lenses[c]
-            frames = render_pair(seen, one, lens, (seed, p, c), others)
+            draw = render_pair if one.design.dense is None else render_dense
+            frames = draw(seen, one, lens, (seed, p, c), others)
         if develop is not None:
             frames = develop(p, c, frames)
             if frames is None:
                 return Decoded.nothing()
         with spent.on("decode"):
-            return decode(frames, one.patterns, known[pair], **plan.limits.decoder)
+            return decode_pair(frames, one.patterns, known[pair], plan.limits)
 
     with abandonable(threads) as pool:
         views = list(pool.map(look, range(len(plan.cameras))))
     if progress is not None:
         progress(0, len(known))
     return over_pairs(plan, measure, threads=threads, progress=progress)
+
+
+def decode_pair(
+    frames: Frames,
+    patterns: RingsForCamera,
+    calibration: PairCalibration,
+    limits: ScanLimits,
+) -> Decoded:
+    """Measure what a camera saw of a projector's rings, or of its coded pixels."""
+    dense = calibration.projector.dense
+    if dense is not None:
+        return decode_dense(frames, dense, calibration, limits.dense)
+    return decode(frames, patterns, calibration, **limits.decoder)
 
 
 def over_pairs(

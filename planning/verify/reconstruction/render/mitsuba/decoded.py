@@ -25,8 +25,10 @@ def decode_path_traced(
     Projectors that shine at the same time by mistake are rendered one by one.
 
     Raises:
-        InputError: If Mitsuba isn't installed, or lacks a camera's lens.
+        InputError: If Mitsuba isn't installed, or lacks a camera's lens, or the
+            pattern is dense.
     """
+    plan.require_rings("rendering by Mitsuba")
     pairs, found = dict(plan.pairs()), dict[tuple[int, int], Decoded]()
     names = {camera.id: c for c, camera in enumerate(plan.cameras)}
     with PathTracer(truth, physics, photometry, threads) as tracer:

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.verify.reconstruction.arrays import Array, Indices, Mask
+from planning.verify.reconstruction.check.overlaps import pixel_sizes
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.scanner import Scanner
 
-from .overlaps import pixel_sizes
 from .ring_fit import Lines, RingFit, in_cloud
 
 _T = TypeVar("_T", bound=np.generic)

@@ -18,12 +18,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planning.verify.reconstruction.arrays import Array, Indices, Mask
+from planning.verify.reconstruction.check.tiles import Tiles, plane_normals
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.scanner import Scanner
 
 from .lattice import PanelEffects
 from .ring_fit import RingFit
-from .tiles import Tiles, plane_normals
 
 # From here on it isn't noise but doubt of a pair, which no average makes less [px].
 _DOUBT_PX = 0.5

@@ -1,6 +1,8 @@
 """What projectors show: which of their light carries a code, and its surfaces."""
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,36 +10,44 @@ from numpy.typing import NDArray
 from geometry.devices import ParallelModel
 from geometry.mesh.tensors import lengths
 from geometry.poses import inverse, transform
+from planning.model.light.dense_code import DenseCode
 from planning.model.planned import PlannedProjector
+from planning.scene.lights import light_of
 
-from .lights import light_of
-from .samples import SampleArrays
+from .surfaces import Coded, CodedPixels, CodeSurfaces, PanelLight, PanelRays
 
 # Wider than any ring that is drawn, as a tangent or in [m].
 _WIDEST = 1e3
 
 
-@dataclass(frozen=True, eq=False)
-class CodeSurfaces(SampleArrays):
-    """One projector's surfaces of equal code at n samples.
+class Pattern(Protocol):
+    """What a projector shows."""
 
-    Attributes:
-        normals: Unit normals m in the world, shape (n, 3).
-        spacing: h, distance of neighbouring edges along m [m], shape (n,).
-        levers: How far errors of the projector move them, `surface_levers`, (n, 3).
-        depths: z before the projector [m], shape (n,).
-        pixel_m: How wide the panel's pixels are there [m], shape (n,).
-        lux_per_lm: Illuminance across the rays of a lumen in the image [1/m^2], (n,).
-        exposure_s: What a frame is exposed for [s], shape (n,).
-    """
+    def __init__(self, projector: PlannedProjector) -> None: ...
 
-    normals: NDArray[np.float64]
-    spacing: NDArray[np.float64]
-    levers: NDArray[np.float64]
-    depths: NDArray[np.float64]
-    pixel_m: NDArray[np.float64]
-    lux_per_lm: NDArray[np.float64]
-    exposure_s: NDArray[np.float64]
+    @property
+    def outermost(self) -> float:
+        """Largest tangent (diverging) or radius in [m] (parallel); inf: no ring."""
+        ...
+
+    def inside(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return which columns of the world, (3, n), light with a code reaches, (n,).
+
+        Whatever the device's own field is.
+        """
+        ...
+
+    def surfaces(self, points: NDArray[np.float64]) -> Coded:
+        """Return the surfaces of equal code through points (n, 3)."""
+        ...
+
+    def everywhere(self) -> PlannedProjector:
+        """Return the projector with a pattern as wide as any light it may send."""
+        ...
+
+    def with_border(self) -> PlannedProjector:
+        """Return the projector with all that it lights beyond its code, too."""
+        ...
 
 
 class RingPattern:
@@ -69,13 +79,12 @@ class RingPattern:
         index = np.clip(index, 1, len(radii) - 1)
         gaps = radii[index] - radii[index - 1]
         m = surface.normals @ frame[:3, :3].T
-        levers = surface_levers(self.projector, points, m)
         return CodeSurfaces(
-            m,
-            gaps * surface.stretch,
-            levers,
             *panel_light(self.projector, points),
             np.full(len(points), self.projector.exposure_s or 0.0),
+            normals=m,
+            spacing=gaps * surface.stretch,
+            levers=PanelRays.of(self.projector, points).levers(m),
         )
 
     def with_border(self) -> PlannedProjector:
@@ -91,6 +100,42 @@ class RingPattern:
 
     def _local(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         return transform(inverse(self.projector.world_from_ring), points)
+
+
+class DensePattern:
+    """Every pixel of the panel with a code of its own."""
+
+    def __init__(self, projector: PlannedProjector) -> None:
+        self.projector, self._code = projector, projector.code or DenseCode()
+
+    @property
+    def outermost(self) -> float:
+        """No ring ends what is coded."""
+        return math.inf
+
+    def inside(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return that all columns (3, n) are: what the device lights is coded."""
+        return np.ones(points.shape[1], dtype=bool)
+
+    def surfaces(self, points: NDArray[np.float64]) -> CodedPixels:
+        """Return the coded pixels at points (n, 3)."""
+        projector = self.projector
+        light = PanelLight(
+            *panel_light(projector, points),
+            np.full(len(points), projector.exposure_s or 0.0),
+        )
+        beams = light_of(projector.device).directions(
+            projector.world_from_device, points
+        )
+        return CodedPixels(self._code, beams, PanelRays.of(projector, points), light)
+
+    def everywhere(self) -> PlannedProjector:
+        """Return the projector: its pattern is as wide as its light."""
+        return self.projector
+
+    def with_border(self) -> PlannedProjector:
+        """Return the projector: nothing is lit beyond the coded pixels."""
+        return self.projector
 
 
 def panel_light(
@@ -112,42 +157,11 @@ def panel_light(
     return depths, pixel_m, lux
 
 
-def surface_levers(
-    projector: PlannedProjector, points: NDArray[np.float64], m: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return how far errors of a projector move its surfaces along m, in [m], (n, 3).
-
-    With Q the origin of the device: of a turn by 1 rad |(P - Q) x m|; of a focal length
-    that is off by the whole, and of a principal point 1 px off along the line that
-    counts most, in light from a point::
-
-        |P - Q| |J_r^T m . (u - u_0)|,    |P - Q| |J_r^T m|
-
-    and in parallel light, where pixels are w apart, |m_x x + m_y y| and w |(m_x, m_y)|,
-    in the device's frame.
-    """
-    pose, device = projector.world_from_device, projector.device
-    offsets = points - pose[:3, 3]
-    turned = lengths(np.cross(offsets, m))
-    local = transform(inverse(pose), points)
-    across = m @ pose[:3, :3]
-    if isinstance(device, ParallelModel):
-        wider = np.einsum("ij,ij->i", across[:, :2], local[:, :2])
-        shifted = device.pixel_pitch_m * np.hypot(*across[:, :2].T)
-    else:
-        per_px = np.einsum("ijk,ij->ik", device.ray_jacobian(local), across)
-        per_px *= lengths(offsets)[:, None]
-        off_centre = device.project(local) - device.camera_matrix[:2, 2]
-        wider = np.einsum("ij,ij->i", per_px, off_centre)
-        shifted = np.hypot(*per_px.T)
-    return np.column_stack([turned, wider, shifted])
-
-
 # A class for each `PlannedProjector.pattern`.
-PATTERNS: dict[str, type[RingPattern]] = {"rings": RingPattern}
+PATTERNS: dict[str, type[Pattern]] = {"rings": RingPattern, "dense": DensePattern}
 
 
-def pattern_of(projector: PlannedProjector) -> RingPattern:
+def pattern_of(projector: PlannedProjector) -> Pattern:
     """Return what a projector shows."""
     return PATTERNS[projector.pattern](projector)
 

@@ -1,0 +1,81 @@
+"""Which options of `plan` exclude each other."""
+
+import os
+from typing import Any
+
+import click
+
+
+def check_options(options: dict[str, Any]) -> None:
+    """Join the meshes that were given, and refuse options that exclude each other.
+
+    Raises:
+        click.UsageError: It names them.
+    """
+    options["meshes"] += options.pop("files")
+    _check_source(options)
+    if options["unit"] and options["size_mm"] is not None:
+        raise click.UsageError("give --unit or --size-mm, not both")
+    _check_target(options)
+    if options["pattern"] == "none":
+        raise click.UsageError("--pattern none isn't built yet: use rings or dense")
+    if options["pattern"] != "rings":
+        _check_without_rings(options)
+
+
+def _check_source(options: dict[str, Any]) -> None:
+    meshes, ranges = options["meshes"], options["ranges"]
+    if ranges is None and not meshes:
+        raise click.UsageError("give --mesh FILE, or --ranges FILE.csv without a mesh")
+    if ranges is not None:
+        _check_ranges(options)
+        return
+    if not meshes[0]:
+        raise click.UsageError("--mesh '' names no file")
+    # os.path answers for names that the system refuses; Path raises.
+    if len(meshes) > 1 or os.path.isdir(meshes[0]):
+        raise click.UsageError(
+            "several meshes on one rig aren't built yet: give one file"
+        )
+
+
+def _check_without_rings(options: dict[str, Any]) -> None:
+    """Refuse what is said of rings where there are none, and what isn't built."""
+    pattern = options["pattern"]
+    if options["ring_axis"] is not None:
+        raise click.UsageError(
+            f"--ring-axis is of rings, and --pattern {pattern} has none: leave it out"
+        )
+
+
+def _check_ranges(options: dict[str, Any]) -> None:
+    if not options["ranges"]:
+        raise click.UsageError("--ranges '' names no file")
+    if options["meshes"]:
+        raise click.UsageError(
+            "give --mesh or --ranges, not both: a mesh says where the object is, and "
+            "placing a mesh by observations isn't built"
+        )
+    for name, why in (
+        ("unit", "the file is in millimetres"),
+        ("size_mm", "the file is in millimetres"),
+        ("select", "the body of ranges has no faces to select"),
+        ("weight", "the body of ranges has no vertices to weigh"),
+    ):
+        if options[name] is not None:
+            raise click.UsageError(f"--{name.replace('_', '-')} with --ranges: {why}")
+    if options["target"] == "dominant":
+        raise click.UsageError(
+            "--target dominant with --ranges: a sphere has no dominant region; the "
+            "target is its whole surface"
+        )
+
+
+def _check_target(options: dict[str, Any]) -> None:
+    chosen = [name for name in ("select", "weight") if options[name] is not None]
+    if len(chosen) == 2:
+        raise click.UsageError("give --select or --weight, not both")
+    if chosen and options["target"] == "surface":
+        raise click.UsageError(f"give --target surface or --{chosen[0]}, not both")
+    if chosen and not options[chosen[0]]:
+        raise click.UsageError(f"--{chosen[0]} '' names no file")

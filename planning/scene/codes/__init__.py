@@ -1,0 +1,1 @@
+"""What projectors show, and the surfaces of equal code that it makes of their light."""

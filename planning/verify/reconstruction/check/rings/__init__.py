@@ -1,0 +1,1 @@
+"""Points on rings: the curves they lie on, and how surely."""

@@ -1,0 +1,1 @@
+"""Images of coded pixels to points: Gray code, phase, and two rays that meet."""
