@@ -57,17 +57,24 @@ class ProjectorStage(PlannedStage):
         )
         selection = resolve_conflicts(among, cover, selection)
         others, proof = certified(cover, selection, samples.weight, among)
-        kinds = {type(body) for body in candidates.scene.bodies}
         proof = proof.changed(
             excluded_pairs={
                 cause: int((candidates.stages == index).sum())
                 for index, cause in enumerate(projector_limits.CAUSES)
-                if index not in _BY_BLOCKERS or _BY_BLOCKERS[index] in kinds
+                if _may_exclude(candidates.scene, index)
             },
             n_regions=int(candidates.scene.region.max()) + 1,
         )
         by_count = {n: candidates.of(chosen) for n, chosen in others.items()}
         return cls(by_count, proof, candidates.of(selection.chosen), candidates)
+
+
+def _may_exclude(scene: Scene, index: int) -> bool:
+    """Whether anything could violate a limit, by its index."""
+    if projector_limits.CAUSES[index] == "pixel_distance":
+        return scene.requirements.projector.max_sample_distance_m is not None
+    kinds = {type(body) for body in scene.bodies}
+    return index not in _BY_BLOCKERS or _BY_BLOCKERS[index] in kinds
 
 
 def plan_projectors(

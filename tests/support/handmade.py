@@ -439,7 +439,9 @@ def _evaluate(
         cause = (SIGHT + PAIR)[max(map(max, pairs))] if not measured else None
     else:
         cause = LIGHT[max(steps)]
-    reference = _reference_light(document, surface, p, n, steep) if not any(lit) else 7
+    reference = LIT
+    if not any(lit):
+        reference = _reference_light(document, surface, p, n, steep)
     sight = MEASURED if measured or not any(lit) else 0
     if not measured and any(lit):
         sight = _reference_sight(document, surface, p, n, lit)

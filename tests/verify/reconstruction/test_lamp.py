@@ -87,7 +87,7 @@ def test_edges_are_as_noisy_as_predicted(rigs, lumens):
     error = edge_error_px(edges, patterns, pair)
     assert len(error) > 3000
     # Of the light, and what the panel's pixels leave.
-    per_px = quality.terms["light"] / quality.grey.noise_px
+    per_px = quality.terms["light"] / quality.edge_px
     variance = quality.edge_px**2 + (quality.terms["linearity"] / per_px) ** 2
     predicted = np.sqrt(np.mean(variance))
     assert np.std(error) == pytest.approx(predicted, rel=0.1)
