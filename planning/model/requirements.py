@@ -84,9 +84,8 @@ class TriangulationLimits:
 
     @property
     def angles(self) -> tuple[float, float]:
-        """Least and largest triangulation angle; all where none is stated [rad]."""
-        low, high = self.min_angle, self.max_angle
-        return low or 0.0, pi if high is None else high
+        """Least and largest triangulation angle, any where none is stated [rad]."""
+        return self.min_angle or 0.0, self.max_angle or pi
 
     @property
     def limited_calibration(self) -> CalibrationErrors:
@@ -266,16 +265,14 @@ class Requirements:
         dominant_coverage: Lit area / area reachable by projectors, on the target.
         min_reachable: Area reachable by projectors / target area.
         target: `dominant` regions, or the whole `surface`.
-        pattern: What projectors show: `rings`, or a `dense` code of every pixel; of
-            `none` there is no projector.
+        pattern: `rings`, or a `dense` code of every pixel; `none` comes later.
         existing: Devices that stand already and are part of every plan.
         region_coverage: Floor of each dominant region: lit area / area reachable by
             projectors, and measured area / area reachable by cameras; 0: no floor.
         region_share: Regions of at least this share of the target's area have it.
         robust: What drawn rigs must meet, where the rest is tightened for it.
         stock: Models of which there are so many and no more.
-        survival: Pairs that must measure what counts, and losses to survive; None:
-            one pair, no loss.
+        survival: Pairs that must measure what counts, and losses to survive.
     """
 
     max_projectors: int

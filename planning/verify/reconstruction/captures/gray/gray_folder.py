@@ -21,6 +21,8 @@ from planning.verify.reconstruction.captures.images import SUFFIXES, read_grey
 from planning.verify.reconstruction.patterns.dense_patterns import DensePattern
 
 _LISTED = 4
+# Images whose means differ by less, as a share of white less black, are as bright.
+_AS_BRIGHT = 0.02
 _NUMBER = re.compile(r"\d+")
 
 
@@ -88,14 +90,21 @@ def _order(
 ) -> tuple[list[int], tuple[str, ...]]:
     """Return where each frame of the pattern is, by how bright the images are.
 
-    White is brighter than all others, and black darker.
+    None is brighter than white or darker than black; on a part of the panel a bit may
+    be as bright or as dark all over.
     """
     w, n = pattern.white, len(stack)
     level = stack[:, ::4, ::4].mean(axis=(1, 2))
     white, black = int(np.argmax(level)), int(np.argmin(level))
-    if (white, black) == (w, w + 1):
+    slack = _AS_BRIGHT * (level[white] - level[black])
+
+    def lit(first: int) -> bool:
+        bright = level[first] >= level[white] - slack
+        return bool(bright and level[first + 1] <= level[black] + slack)
+
+    if lit(w):
         return list(range(n)), ()
-    if (white, black) == (0, 1):
+    if lit(0):
         note = f"white and black come first ({names[0]}, {names[1]})"
         return [*range(2, n), 0, 1], (note,)
     raise CapturesError(
