@@ -16,8 +16,9 @@ from planning.verify.reconstruction.scanner import Scanner
 
 from .tiles import Tiles, plane_normals
 
-# Points whose sigma is so many times that of the surest in their cell add nothing.
-_MUCH_WORSE = 3.0
+# Points whose sigma is so many times that of the surest in their cell add nothing; in
+# cells so many times as large they go.
+_MUCH_WORSE, _PLACE = 3.0, 4.0
 # A point this many deviations off the surest one's plane is of another surface, or
 # false [sigma of both].
 _APART = 5.0
@@ -56,6 +57,40 @@ def merge_dense(cloud: Cloud, plan: Scanner, *, cell_m: float) -> DenseMerged:
     known = np.isfinite(normals[:, :1])
     facing = np.where(known, normals, -cloud.rays)
     sigma = cloud.sigma(facing)
+    # Unsure points scatter over cells beside those of sure ones, and would stay there.
+    about = _cells(cloud.points, np.zeros(len(cloud), np.int64), _PLACE * cell_m)
+    worth = np.flatnonzero(sigma <= _MUCH_WORSE * _least(about, sigma))
+    found = _merged(cloud.take(worth), facing[worth], sigma[worth], plan, cell_m)
+    order = worth[found.order]
+    stays, shared = (np.zeros(len(cloud), dtype=bool) for _ in range(2))
+    stays[order] = True
+    shared[worth] = found.shared
+    kept = cloud.take(order)
+    kept = replace(
+        kept,
+        points=kept.points + found.away_m[:, None] * facing[order],
+        noise_px=kept.noise_px * np.minimum(found.remaining, 1.0),
+    )
+    return DenseMerged(kept, stays, shared, normals[order], kept.sigma(facing[order]))
+
+
+@dataclass(frozen=True, eq=False)
+class _Merged:
+    """Which points stay, how far these move along their normals, and their noise left.
+
+    `order` and what follows have shape (k,), the noise as a share; `shared` tells of
+    all n points whether several pairs measured there.
+    """
+
+    order: Indices
+    away_m: Array
+    remaining: Array
+    shared: Mask
+
+
+def _merged(
+    cloud: Cloud, facing: Array, sigma: Array, plan: Scanner, cell_m: float
+) -> _Merged:
     octant = ((facing > 0.0) @ np.array([1, 2, 4])).astype(np.int64)
     _, cell = np.unique(_cells(cloud.points, octant, cell_m), return_inverse=True)
     best = _surest(cell, sigma)
@@ -76,16 +111,16 @@ def merge_dense(cloud: Cloud, plan: Scanner, *, cell_m: float) -> DenseMerged:
     shared = (np.bincount(cell, pair != pair[own]) > 0.0)[cell]
     order = np.sort(best)
     rank = cell[order]
-    stays = np.zeros(len(cloud), dtype=bool)
-    stays[order] = True
     remaining = 1.0 / (np.sqrt(every[rank]) * sigma[order])
-    kept = cloud.take(order)
-    kept = replace(
-        kept,
-        points=kept.points + mean[rank, None] * facing[order],
-        noise_px=kept.noise_px * np.minimum(remaining, 1.0),
-    )
-    return DenseMerged(kept, stays, shared, normals[order], kept.sigma(facing[order]))
+    return _Merged(order, mean[rank], remaining, shared)
+
+
+def _least(place: Array, sigma: Array) -> Array:
+    """Least sigma of the points in each one's place, shape (n,)."""
+    _, place = np.unique(place, return_inverse=True)
+    least = np.full(int(place.max(initial=-1)) + 1, np.inf)
+    np.minimum.at(least, place, sigma)
+    return least[place]
 
 
 def dense_normals(cloud: Cloud, plan: Scanner) -> Array:
