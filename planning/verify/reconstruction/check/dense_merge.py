@@ -57,9 +57,13 @@ def merge_dense(cloud: Cloud, plan: Scanner, *, cell_m: float) -> DenseMerged:
     known = np.isfinite(normals[:, :1])
     facing = np.where(known, normals, -cloud.rays)
     sigma = cloud.sigma(facing)
-    # Unsure points scatter over cells beside those of sure ones, and would stay there.
+    # Unsure points scatter over cells beside those of sure ones, and would stay there;
+    # along normals of such points, which scatter too, some would seem sure.
     about = _cells(cloud.points, np.zeros(len(cloud), np.int64), _PLACE * cell_m)
-    worth = np.flatnonzero(sigma <= _MUCH_WORSE * _least(about, sigma))
+    spread = np.linalg.norm(cloud.shift, axis=1) * np.hypot(
+        cloud.noise_px, cloud.bias_px
+    )
+    worth = np.flatnonzero(spread <= _MUCH_WORSE * _least(about, spread))
     found = _merged(cloud.take(worth), facing[worth], sigma[worth], plan, cell_m)
     order = worth[found.order]
     stays, shared = (np.zeros(len(cloud), dtype=bool) for _ in range(2))

@@ -18,9 +18,10 @@ from .uneven_light import MOST_PX, moved_by, places_lit
 
 # Why a lit pixel may tell no code, in the order in which it is asked.
 CODE_CAUSES = ("mixed", "modulation", "outside_panel", "partly_lit")
-# Phases vaguer than this are none [turns], as are sinusoids of less than this share of
-# what white and black differ by.
-_VAGUE, _FAINT = 0.04, 0.15
+# Phases vaguer than this are none [turns]: where light grazes the surface, millions of
+# pixels would have tails. Nor are sinusoids of less than this share of what white and
+# black differ by.
+_VAGUE, _FAINT = 0.025, 0.15
 # Beside the panel's border light is missing that phases take to be there [px].
 _BORDER_PX = 2.0
 # Uniform over a stripe.
