@@ -48,7 +48,7 @@ def main() -> int:
     codes: list[int] = []
     for mesh, words, lights in _jobs(sys.argv[1:]):
         for light in lights:
-            code, row, timings = _run(mesh, words, light)
+            code, row, timings = run(mesh, (*words, "--light", light), light)
             codes.append(code)
             stages.append(f"| {mesh.name} | {light} | {timings} |")
             print(row, flush=True)
@@ -80,18 +80,20 @@ def _help_seconds() -> float:
     return statistics.median(seconds)
 
 
-def _run(mesh: Path, words: tuple[str, ...], light: str) -> tuple[int, str, str]:
+def run(
+    mesh: Path, words: tuple[str, ...], label: str, *, most: int = 3
+) -> tuple[int, str, str]:
     """Return the exit code, the row of the table, and the seconds of the stages."""
     with tempfile.TemporaryDirectory() as folder:
-        command = [*RUN, "--mesh", str(mesh), "--max-projectors", "3", "--quiet"]
-        command += ["--light", light, "-o", folder, *words]
+        command = [*RUN, "--mesh", str(mesh), "--max-projectors", str(most), "--quiet"]
+        command += ["-o", folder, *words]
         begin = time.perf_counter()
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         wall = time.perf_counter() - begin
         written = Path(folder) / "plan.json"
         plan = RigPlan.load(written) if written.exists() else None
     code = done.returncode
-    start = f"| {mesh.name} | {light} | {code} |"
+    start = f"| {mesh.name} | {label} | {code} |"
     if plan is None:
         said = " ".join(done.stderr.replace(str(mesh), "FILE").split())[:160]
         return code, f"{start} | | | {wall:.1f} | {said} | | | | | | |", "no plan"

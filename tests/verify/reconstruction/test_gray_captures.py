@@ -10,7 +10,10 @@ from PIL import Image
 from support.dense_rigs import BENT, camera_at, frames_of, projector_at, square
 
 from planning.cli.main import commands
+from planning.model.errors import CapturesError
 from planning.model.light.dense_code import DenseCode
+from planning.verify.reconstruction.decode.dense.dense_inspection import require_order
+from planning.verify.reconstruction.patterns.dense_patterns import DensePattern
 
 SIZE, CODED = (640, 480), (128, 96)
 PROCAM = Path(__file__).parents[4] / "shared" / "data" / "captures" / "procam"
@@ -196,3 +199,33 @@ def test_the_board_of_real_captures(benchmark_module):
     assert found.plane_rms_m < 1.3e-3
     assert found.neighbours_m.mean() == pytest.approx(0.075, rel=5e-3)
     assert np.median(found.residual_px) < 0.3
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_step_along_the_border_of_a_bit_is_no_wrong_order(turned):
+    """Rows 40 and 87, whose codes differ in the highest bit alone, meet at a step."""
+    pattern = DensePattern(DenseCode(shifts=0), (64, 128))
+    whole = np.arange(128)[:, None].repeat(64, axis=1)
+    cut = np.concatenate([np.arange(41), np.arange(87, 128)])
+    rows = np.zeros((128, 64), dtype=int)
+    # A quarter of the width shows all rows, so that some changes are as they should be.
+    rows[:, :16], rows[:82, 16:] = whole[:, :16], cut[:, None]
+    lit = np.zeros((128, 64), dtype=bool)
+    lit[:, :16], lit[:82, 16:] = True, True
+    columns = np.arange(64)[None].repeat(128, axis=0)
+    frames = [np.full((128, 64), 200.0), np.full((128, 64), 20.0)]
+    for frame in pattern.frames[: pattern.white]:
+        share = pattern.shares(frame)[columns if frame.along == "column" else rows]
+        frames.append(20.0 + 180.0 * share)
+    # Four pixels of the image for one of the panel.
+    window = np.array(frames, dtype=np.float32).repeat(4, axis=1).repeat(4, axis=2)
+    lit = lit.repeat(4, axis=0).repeat(4, axis=1)
+    names = ["white", "black", *(frame.name for frame in pattern.frames)]
+    if not turned:
+        require_order(window, lit, pattern, names)
+        return
+    first = 2 + pattern.first_bit(1)
+    order = [first + 2, first + 3, first, first + 1]
+    window[first : first + 4] = window[order]
+    with pytest.raises(CapturesError, match="can't be the bits"):
+        require_order(window, lit, pattern, names)
