@@ -389,8 +389,9 @@ def test_more_cameras_get_fewer_of_the_larger_programs(monkeypatch, n_cameras, m
     monkeypatch.setattr(camera_baselines, "BaselineSearch", search)
     monkeypatch.setattr(camera_baselines, "baseline_limits", lambda *_: None)
     monkeypatch.setattr(camera_baselines, "_keeping_floors", lambda *_: [])
+    scene = SimpleNamespace(requirements=SimpleNamespace(survival=None))
     samples = SimpleNamespace(
-        scene=None, surface=None, rings=None, count_lit=lambda cameras: 0
+        scene=scene, surface=None, rings=None, count_lit=lambda cameras: 0
     )
     cameras = [None] * n_cameras
     camera_baselines.widen_baselines(samples, cameras)

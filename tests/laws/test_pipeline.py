@@ -113,7 +113,9 @@ def test_free_axes_are_tried_where_centred_ones_alone_fall_short(plan, monkeypat
 
     def drawn(taken="centred", asked="auto"):
         request = SimpleNamespace(ring_axis=asked)
-        return SimpleNamespace(axes=taken, request=request, ready=0, stage=0)
+        return SimpleNamespace(
+            axes=taken, request=request, ready=0, stage=0, surviving=None
+        )
 
     checked = plan.document.reconstruction
     failed = checked.changed(passed=False, failures=("rms distance",))

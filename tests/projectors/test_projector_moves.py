@@ -147,6 +147,9 @@ def test_poses_between_are_taken_if_wider_with_light_to_spare(
         def with_all(self, projectors):
             return State(offered)
 
+        def survives(self, margin):
+            return True
+
     monkeypatch.setattr(
         "planning.projectors.projector_poses.widest_between", lambda *given: ("Q",)
     )

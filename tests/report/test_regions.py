@@ -311,6 +311,7 @@ def test_a_floor_that_fresh_samples_miss_asks_for_one_device_more(
 
     monkeypatch.setattr(stages, "larger", larger)
     partial = SimpleNamespace(
+        surviving=None,
         stage=SimpleNamespace(kind="projector", projectors=()),
         camera_stage=SimpleNamespace(kind="camera"),
         cameras=(),
