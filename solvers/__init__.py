@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from solvers.covers.cover import solve_cover as solve_cover
     from solvers.covers.cover import solve_max_coverage as solve_max_coverage
     from solvers.covers.cover_problem import CoverProblem as CoverProblem
+    from solvers.covers.paired.pair_cover import solve_pair_cover as solve_pair_cover
+    from solvers.covers.paired.pair_problem import PairCoverProblem as PairCoverProblem
 
     from .status import SolveStatus as SolveStatus
 
@@ -20,10 +22,12 @@ _EXPORTS = {
     "CellProblem": "cells.cell_problem",
     "CoverProblem": "covers.cover_problem",
     "CoverSolution": "covers.cover",
+    "PairCoverProblem": "covers.paired.pair_problem",
     "SolveStatus": "status",
     "bound_count": "cells.cell_bound",
     "solve_cover": "covers.cover",
     "solve_max_coverage": "covers.cover",
+    "solve_pair_cover": "covers.paired.pair_cover",
 }
 
 

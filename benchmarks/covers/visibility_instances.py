@@ -48,8 +48,28 @@ class Instance:
         return f"{stem} {self.field} {self.samples:,} x {self.candidates:,}"
 
 
+@dataclass(frozen=True, eq=False)
+class SeenSamples:
+    """Samples and candidates of an instance, and which sees which.
+
+    Attributes:
+        seen: Whether a sample (row) is seen by a candidate (column); all rows are.
+        points: The samples, shape (n, 3).
+        origins: Where the candidates stand, shape (m, 3).
+    """
+
+    seen: NDArray[np.bool_]
+    points: NDArray[np.float64]
+    origins: NDArray[np.float64]
+
+
 def covers(instance: Instance) -> NDArray[np.bool_]:
     """Return which sample (row) each candidate (column) sees; all rows are seen."""
+    return seen_samples(instance).seen
+
+
+def seen_samples(instance: Instance) -> SeenSamples:
+    """Return the samples and candidates of an instance."""
     shared = shared_meshes.BY_NAME[instance.mesh]
     mesh = load_mesh(shared.path, **shared.options)
     # More than asked for: what no candidate sees is left out.
@@ -73,7 +93,9 @@ def covers(instance: Instance) -> NDArray[np.bool_]:
     if reached.size < instance.samples:
         raise ValueError(f"{instance.name}: only {reached.size} samples are seen")
     kept = np.random.default_rng(2).permutation(reached)[: instance.samples]
-    return np.ascontiguousarray(seen[:, np.sort(kept)].T)
+    kept = np.sort(kept)
+    rows = np.ascontiguousarray(seen[:, kept].T)
+    return SeenSamples(rows, samples.points[kept], origins)
 
 
 def _poses(

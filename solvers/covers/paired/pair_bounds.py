@@ -40,7 +40,9 @@ class PairBounds(PartBounds):
         self._target, self._budget = target, budget
         self._grid = 2.0 ** max(0.0, np.ceil(np.log2(max(self._total, 1.0) / _EXACT)))
 
-    def without(self, fixed: NDArray[np.int64], shares: NDArray[np.float64]) -> GroupPart:
+    def without(
+        self, fixed: NDArray[np.int64], shares: NDArray[np.float64]
+    ) -> GroupPart:
         """Return the part of all selections that hold the fixed sets, not bounded."""
         groups = tuple(np.array([s]) for s in fixed.tolist())
         whole = self.whole(shares)
@@ -67,7 +69,7 @@ def count_bound(
     cover: PairRows, shares: NDArray[np.float32], fixed: NDArray[np.int64]
 ) -> int:
     """Return a number of sets that every cover has, from the sum of the largest."""
-    worths = np.sort((shares.astype(np.float64) @ cover.weights))[::-1]
+    worths = np.sort(shares.astype(np.float64) @ cover.weights)[::-1]
     held = float((shares[fixed].astype(np.float64) @ cover.weights).sum())
     sums = held + np.concatenate([[0.0], np.cumsum(worths)])
     # A share above the true one never makes a sum too small.

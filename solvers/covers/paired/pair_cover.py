@@ -131,8 +131,7 @@ def solve_pair_cover(
             problem, SolveStatus.OPTIMAL, fixed, float(fixed.size), proof
         )
     if not cover.total >= cover.quota:
-        everything = greedy(cover, fixed, work)
-        few = prune(cover, everything, fixed)
+        few = greedy(cover, fixed, work)
         if max_sets is not None and few.size > max_sets:
             few = _most(cover, max_sets, work, seed, fixed)
         proof = "all sets together cover less than is required"
@@ -152,8 +151,7 @@ class _Count:
         self.fixed, self.max_sets = cover.problem.fixed, max_sets
         self.shares = worth(cover)
         self.lower, self.proof = count_bound(cover, self.shares, self.fixed), _LARGEST
-        found = greedy(cover, self.fixed, budget)
-        self.selected = prune(cover, found, self.fixed)
+        self.selected = greedy(cover, self.fixed, budget)
 
     @property
     def settled(self) -> bool:
@@ -260,12 +258,11 @@ def solve_most_pairs(
         bound, proof = answer.upper_bound, f"sets of {n_sets} by branch and bound"
         if not answer.complete:
             proof = cut_short(proof, work)
-    covered, proved = cover.weight_of(best), bound <= cover.weight_of(best)
+    proved = bound <= cover.weight_of(best)
     status = SolveStatus.OPTIMAL if proved else SolveStatus.FEASIBLE
     weight = problem.covered_weight(best)
     # What rounding to whole weights may have taken from the bound.
     upper = weight if proved else max(weight, (bound + _half(cover)) * cover.unit)
-    del covered
     return MostPairsSolution(problem, n_sets, status, best, upper, proof)
 
 

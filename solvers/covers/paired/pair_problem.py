@@ -113,7 +113,9 @@ class PairCoverProblem:
         return float(self.weights[self.covered(selected)].sum())
 
 
-def packed_pairs(together: Together, n_sets: int, n_elements: int) -> NDArray[np.uint64]:
+def packed_pairs(
+    together: Together, n_sets: int, n_elements: int
+) -> NDArray[np.uint64]:
     """Return the bit rows of a problem's pairs, (n_s, n_s, n_words).
 
     ``together(i)`` says with which set j >= i set i covers which element, (n_s, n_e);

@@ -59,6 +59,11 @@ class PairRows:
         return float(np.gcd.reduce(self.weights.astype(np.int64), initial=0) or 1)
 
     @cached_property
+    def alike(self) -> bool:
+        """Whether all rows weigh the same."""
+        return bool(np.all(self.weights == self.weights[:1]))
+
+    @cached_property
     def loops(self) -> NDArray[np.bool_]:
         """Whether set s covers a row alone, shape (n_s, n_r)."""
         each = np.arange(self.n_sets)

@@ -10,6 +10,8 @@ from .pair_selection import PairSelection
 
 # Exchanges during which a set that left stays away.
 _TENURE = 5
+# What weight that a set prepares counts for beside weight that it covers.
+_PREPARED = (0.0, 0.25, 0.5, 0.75)
 
 
 def greedy(
@@ -19,20 +21,32 @@ def greedy(
     *,
     n_sets: int | None = None,
 ) -> NDArray[np.int64]:
-    """Return sets that cover what is required, or as many as are allowed.
+    """Return sets that cover what is required, or much with as many as are allowed.
 
-    The next is what adds most, or prepares most where none adds anything. `start` is
-    in every selection.
+    The next is what adds most, weight that it prepares counting for a share; the best
+    of a few shares. `start` is in every selection.
     """
+    found = [_greedily(cover, start, budget, share, n_sets) for share in _PREPARED]
+    if n_sets is not None:
+        return max(found, key=cover.weight_of)
+    return min(found, key=len)
+
+
+def _greedily(
+    cover: PairRows,
+    start: NDArray[np.int64],
+    budget: WorkBudget,
+    share: float,
+    n_sets: int | None,
+) -> NDArray[np.int64]:
     state = PairSelection(cover, start.tolist(), budget)
     most = cover.n_sets if n_sets is None else n_sets
     quota = cover.quota if n_sets is None else np.inf
     while len(state.chosen) < most and state.weight < min(quota, cover.total):
         gains, prepared = state.gains()
-        # What lies between the two scales never mixes them up.
-        best = np.lexsort((-prepared, -gains))[0]
-        state.add(int(best))
-    return np.sort(np.array(state.chosen, dtype=np.int64))
+        state.add(int(np.lexsort((-prepared, -(gains + share * prepared)))[0]))
+    chosen = np.sort(np.array(state.chosen, dtype=np.int64))
+    return prune(cover, chosen, start) if n_sets is None else chosen
 
 
 def prune(
@@ -62,7 +76,10 @@ def exchanged(
     The best exchange is made even where it loses, and the set that left stays away for
     a while (tabu search). Ties are broken at random.
     """
-    state, rng = PairSelection(cover, start.tolist(), budget), np.random.default_rng(seed)
+    state, rng = (
+        PairSelection(cover, start.tolist(), budget),
+        np.random.default_rng(seed),
+    )
     best, best_weight, until = start, state.weight, np.zeros(cover.n_sets)
     stale = 0
     for move in range(max_moves):

@@ -19,6 +19,9 @@ from solvers.status import WorkBudget
 
 from .pair_rows import PairRows
 
+# Work of a row looked at for a set.
+_UNITS = 4.0
+
 
 class PairSelection:
     """A selection under change.
@@ -37,6 +40,7 @@ class PairSelection:
         self._partners = np.zeros((cover.n_sets, n_r), dtype=np.int16)
         self._pairs = np.zeros(n_r, dtype=np.int32)
         self._seen = np.zeros(n_r, dtype=np.int32)
+        self._kept: dict[int, NDArray[np.int8]] = {}
         for s in chosen:
             self.add(int(s))
 
@@ -67,49 +71,69 @@ class PairSelection:
     def gains(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the weight that each set would add, and the weight it would prepare.
 
-        A set prepares open rows that it sees with a partner to be had: what breaks ties
-        while no pair is there yet. Selected sets add -1.
+        A set prepares open rows that want for sets to see them, where it has a partner
+        to be had. Selected sets add and prepare -1.
         """
-        return self._gains_over(~self.covered, self._pairs, self._seen, None)
+        cover, rows = self._cover, np.flatnonzero(~self.covered)
+        gains = self._closed(rows, self._pairs, self._seen, self._partners[:, rows])
+        wanting = rows[self._seen[rows] < np.maximum(cover.views[rows], 2) - 1]
+        prepared = self._weigh(cover.partnered[:, wanting], wanting)
+        gains[self.chosen] = prepared[self.chosen] = -1.0
+        return gains, prepared
 
     def exchanges(self, i: int) -> NDArray[np.float64]:
         """Return the weight covered with each set in the place of set i, (n_s,).
 
         Selected sets cover -1.
         """
-        pairs = self._pairs - self._partners[i] - self._cover.loops[i]
-        seen = self._seen - self._cover.sees[i]
-        kept = (pairs > 0) & (seen >= self._cover.views)
-        left = float(self._cover.weights[kept].sum())
-        gains, _ = self._gains_over(~kept, pairs, seen, i)
-        return np.where(gains < 0, -1.0, left + gains)
+        cover = self._cover
+        pairs = self._pairs - self._partners[i] - cover.loops[i]
+        seen = self._seen - cover.sees[i]
+        kept = (pairs > 0) & (seen >= cover.views)
+        rows = np.flatnonzero(~kept)
+        partners = self._partners[:, rows] - self._bits(i)[:, rows]
+        covered = float(cover.weights[kept].sum())
+        covered = covered + self._closed(rows, pairs, seen, partners)
+        covered[self.chosen] = -1.0
+        return covered
 
-    def _gains_over(
+    def _closed(
         self,
-        open_rows: NDArray[np.bool_],
+        rows: NDArray[np.int64],
         pairs: NDArray[np.int32],
         seen: NDArray[np.int32],
-        without: int | None,
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        cover, rows = self._cover, np.flatnonzero(open_rows)
-        self._budget.spend(4.0 * cover.n_sets * (rows.size + 8))
-        partners = self._partners[:, rows]
-        if without is not None:
-            partners = partners - self._bits(without)[:, rows]
-        sees, weights = cover.sees[:, rows], cover.weights[rows]
+        partners: NDArray[np.int16],
+    ) -> NDArray[np.float64]:
+        """Return the weight of some rows that each set would cover, (n_s,)."""
+        cover = self._cover
         paired = (pairs[rows] + partners + cover.loops[:, rows]) > 0
-        closes = paired & (seen[rows] + sees >= cover.views[rows])
-        gains = closes @ weights
-        prepared = cover.partnered[:, rows] @ weights
-        gains[self.chosen] = -1.0
-        return gains, prepared
+        lacking = cover.views[rows] - seen[rows]
+        if np.any(lacking > 0):
+            paired &= cover.sees[:, rows] >= lacking
+        return self._weigh(paired, rows)
+
+    def _weigh(
+        self, table: NDArray[np.bool_], rows: NDArray[np.int64]
+    ) -> NDArray[np.float64]:
+        self._budget.spend(_UNITS * (table.size + 100.0 * len(table)))
+        if self._cover.alike:
+            counts = np.count_nonzero(table, axis=1)
+            return counts * self._cover.grain
+        return table @ self._cover.weights[rows]
 
     def _spread(self, s: int, sign: int) -> None:
         bits = self._bits(s)
-        # A set is no partner of its own.
-        bits[s] = False
         self._partners += sign * bits
+        # A set is no partner of its own.
+        self._partners[s] -= sign * bits[s]
+        if sign < 0:
+            del self._kept[s]
         self._budget.spend(2.0 * self._cover.size)
 
     def _bits(self, s: int) -> NDArray[np.int8]:
-        return unpack_rows(self._cover.good[s], len(self._cover.rows)).view(np.int8)
+        """With which set a set covers which row; kept while it is selected."""
+        if s not in self._kept:
+            self._budget.spend(self._cover.size)
+            bits = unpack_rows(self._cover.good[s], len(self._cover.rows))
+            self._kept[s] = bits.view(np.int8)
+        return self._kept[s]

@@ -21,7 +21,10 @@ from .pair_rows import PairRows
 
 _BATCH = 48
 _MAX_OPEN = 600_000_000
-_FIRST_STEPS, _STEPS = 200, 40
+# Steps for the whole, and for a part that starts from its parent's multipliers; fewer
+# where splitting costs less than bounding well.
+_FIRST_STEPS, _STEPS, _LEAST_STEPS = 200, 40, 10
+_SMALL = 50_000.0
 _CENTRES = 6
 _LIKENESS = (0.6, 0.3)
 
@@ -105,6 +108,7 @@ class PairTree:
 
     def _take(self, parts: list[GroupPart], steps: int) -> None:
         """Bound parts, look at what they would take, and keep those still open."""
+        steps = max(_LEAST_STEPS, int(steps * min(1.0, self.cover.size / _SMALL)))
         several: list[GroupPart] = []
         for part in parts:
             only = self._only(part)
