@@ -1,5 +1,6 @@
 """Rigs that a calibration may have left, and where they put what was measured."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeVar
 
@@ -13,6 +14,7 @@ from planning.verify.reconstruction.calibration import (
     ProjectorCalibration,
 )
 from planning.verify.reconstruction.cloud import Cloud
+from planning.verify.reconstruction.decode.dense.two_rays import meet_rays
 from planning.verify.reconstruction.decode.triangulate import intersect_rings
 from planning.verify.reconstruction.scanner import Scanner
 
@@ -55,23 +57,59 @@ def displaced(cloud: Cloud, known: Scanner, taken: Scanner) -> Array:
     """Return how far points move when the rig is taken to be another, (n, 3) [m].
 
     The pixels of camera and panel stay; of the panel they say what ring is taken to
-    have lit the point. NaN where the ray then passes that ring by.
+    have lit the point, or which pixel; of a second camera's image where it shows the
+    same code. NaN where the ray then passes that ring by.
     """
     moved = np.zeros_like(cloud.points)
     for (p, c), _ in known.pairs():
-        rows = np.flatnonzero((cloud.projector == p) & (cloud.camera == c))
-        if len(rows):
-            part = cloud.take(rows)
-            lit, _ = known.projectors[p].panel(part.points)
-            where = (
-                _placed(part, lit, rig.projectors[p], rig.cameras[c])
-                for rig in (taken, known)
+        for ring in np.unique(cloud.ring.clip(max=0)):
+            rows = np.flatnonzero(
+                (cloud.projector == p)
+                & (cloud.camera == c)
+                & (cloud.ring.clip(max=0) == ring)
             )
-            moved[rows] = np.subtract(*where)
+            if len(rows):
+                part = cloud.take(rows)
+                place = _places(part, known, (p, c))
+                moved[rows] = place(taken) - place(known)
     return moved
 
 
-def _placed(
+def _places(
+    cloud: Cloud, known: Scanner, pair: tuple[int, int]
+) -> Callable[[Scanner], Array]:
+    """Return what puts points of one pair and kind where a rig has them."""
+    p, c = pair
+    lit, _ = known.projectors[p].panel(cloud.points)
+    if cloud.ring[0] >= 0:
+        return lambda rig: _on_rings(cloud, lit, rig.projectors[p], rig.cameras[c])
+    if cloud.ring[0] == -1:
+        sure = np.ones_like(lit)
+        return lambda rig: (
+            meet_rays(
+                rig.cameras[c].centre,
+                rig.cameras[c].rays(cloud.pixels),
+                lit,
+                sure,
+                rig.projectors[p],
+            ).points
+        )
+    other = int(cloud.by_camera[0])
+    seen = known.cameras[other].project(cloud.points)
+    return lambda rig: _between(rig.cameras[c], cloud.pixels, rig.cameras[other], seen)
+
+
+def _between(
+    one: CameraCalibration, pixels: Array, other: CameraCalibration, seen: Array
+) -> Array:
+    """Where rays of one camera come nearest to those of another, (n, 3)."""
+    r, d = one.rays(pixels), other.rays(seen)
+    way, cosine = other.centre - one.centre, np.einsum("ij,ij->i", r, d)
+    along = (r @ way - cosine * (d @ way)) / (1.0 - cosine**2)
+    return one.centre + along[:, None] * r
+
+
+def _on_rings(
     cloud: Cloud, lit: Array, projector: ProjectorCalibration, camera: CameraCalibration
 ) -> Array:
     return intersect_rings(

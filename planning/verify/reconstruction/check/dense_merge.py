@@ -121,10 +121,10 @@ def _merged(
 
 def _least(place: Array, sigma: Array) -> Array:
     """Least sigma of the points in each one's place, shape (n,)."""
-    _, place = np.unique(place, return_inverse=True)
-    least = np.full(int(place.max(initial=-1)) + 1, np.inf)
-    np.minimum.at(least, place, sigma)
-    return least[place]
+    _, among = np.unique(place, return_inverse=True)
+    least = np.full(int(among.max(initial=-1)) + 1, np.inf)
+    np.minimum.at(least, among, sigma)
+    return least[among]
 
 
 def dense_normals(cloud: Cloud, plan: Scanner) -> Array:
