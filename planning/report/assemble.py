@@ -36,6 +36,7 @@ from planning.report.advice.what_helps import with_fewer_needed, with_relaxation
 from planning.report.entries.cost_entry import cost_record
 from planning.report.entries.overlaps import overlap_records
 from planning.report.entries.range_entries import ranges_record, with_spread
+from planning.report.entries.station_entries import stations_record
 from planning.report.entries.survival_entries import survival_record
 from planning.report.entries.violations import violations
 from planning.rings.ring_pitch import widest_gap
@@ -68,7 +69,7 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
     among = scene.among((*devices.projectors, *devices.cameras))
     coverage, certificates = claims.coverage, _certificates(partial)
     regions = entries.region_records(scene.mesh, partial.ready.regions, claims)
-    if not partial.truncated:
+    if not partial.truncated and partial.stationed is None:
         coverage = with_relaxations(partial, devices, claims, clock)
         regions = with_floor_relaxations(
             regions, claims.region_samples, partial.request.rig, devices
@@ -126,6 +127,9 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
         reconstruction=None,
         timings_s=dict(clock.seconds),
     )
+    if partial.stationed is not None:
+        stations = stations_record(partial.stationed, devices)
+        document = document.changed(stations=stations)
     if survival is not None:
         document = document.changed(survival=survival)
     if partial.request.ranges is not None:

@@ -1,0 +1,85 @@
+"""Heads of a plan as stages of their projectors and cameras, and their bound."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from planning.cameras.camera_cover import CameraCover, candidate_cover
+from planning.cameras.proved_cameras import CameraStage
+from planning.model.planned import PlannedProjector
+from planning.projectors.candidate_set import CandidateSet
+from planning.projectors.projector_stage import ProjectorStage
+from planning.projectors.proved_projectors import prove_fewest
+from planning.proofs.all_poses import Effort
+from planning.proofs.candidate_certificate import unproved, unsought
+from planning.proofs.selection import select_fewest
+from planning.scene.camera_views import CandidateViews
+from planning.scene.draws import DRAWS
+from planning.scene.lighting import lit_stages
+from planning.scene.limits.projector_limits import LIT
+from planning.scene.measured import LitSamples, measured_by
+from planning.scene.scene import Scene
+
+from .head_poses import PlacedHead
+
+
+def stages_of(
+    scene: Scene, planned: Sequence[PlacedHead], reference: Sequence[PlacedHead]
+) -> tuple[ProjectorStage, CameraStage]:
+    """Return the devices of heads as stages of which nothing is proved.
+
+    What is proved is of heads. After the planned ones stand those of the reference set,
+    each of which measures by itself.
+    """
+    heads = [*planned, *reference]
+    projectors = tuple(p for head in heads for p in head.projectors)
+    cameras = tuple(c for head in heads for c in head.cameras)
+    n_projectors = sum(len(head.projectors) for head in planned)
+    n_cameras = sum(len(head.cameras) for head in planned)
+    target = scene.target_samples(DRAWS.projectors)
+    stages = lit_stages(scene, projectors, target)
+    candidates = CandidateSet(scene, target, projectors, stages, n_projectors)
+    proof = unproved(candidates.cover, target.samples.weight).changed(given=0)
+    lights = ProjectorStage(
+        {n_projectors: projectors[:n_projectors]},
+        proof,
+        projectors[:n_projectors],
+        candidates,
+    )
+    target = scene.target_samples(DRAWS.cameras)
+    lit = lit_stages(scene, projectors, target) == LIT
+    bright = np.flatnonzero(lit[:, :n_projectors].any(axis=1))
+    samples = LitSamples.of(projectors, target.take(bright), lit[bright])
+    views = CandidateViews(scene, cameras)
+    seen = views.on(samples.target)
+    measured = measured_by(scene, cameras, samples, seen)
+    cover = candidate_cover(scene, measured, samples, cameras)
+    cover = replace(cover, n_existing=n_cameras)
+    proof = unproved(cover, target.samples.weight).changed(given=0)
+    return lights, CameraStage(
+        {n_cameras: cameras[:n_cameras]},
+        proof,
+        cameras[:n_cameras],
+        CameraCover(views, samples, measured, unsought(cover)),
+    )
+
+
+def least_by_light(
+    scene: Scene,
+    heads: Sequence[PlacedHead],
+    templates: tuple[PlannedProjector, ...],
+    effort: Effort,
+) -> int | None:
+    """Return how many heads it takes at least, wherever they stand.
+
+    As many projectors as light enough anywhere in the workspace, shared out among
+    heads: what a head measures it lights. None: the bound wasn't looked for.
+    """
+    target = scene.target_samples(DRAWS.projectors)
+    projectors = tuple(p for head in heads for p in head.projectors)
+    candidates = CandidateSet.over(scene, target, projectors)
+    stage = ProjectorStage.over(candidates, select_fewest(candidates.cover))
+    bound = prove_fewest(scene, stage, templates, effort).certificate.continuous
+    each = len(heads[0].projectors)
+    return None if bound is None else -(-bound.lower_bound // each)
