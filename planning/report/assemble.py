@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from planning.cameras.baselines.baseline_rows import baseline_rows
 from planning.cameras.baselines.seams import SampledSurface, overlap_components
+from planning.model.bodies import Obstacle
 from planning.model.document.certificates import Certificates
 from planning.model.document.device_records import BaselineRow
 from planning.model.document.input_records import (
@@ -23,7 +24,6 @@ from planning.model.document.plan_document import (
     MemberRecord,
     PlanDocument,
 )
-from planning.model.obstacles import Obstacle
 from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
