@@ -168,7 +168,10 @@ def _lacking_with_each(cover: HeadCover, others: HeadSets, offered: HeadSets) ->
     rows, floors = cover.quotas.regions.row, cover.quotas.floors
     served = covers[:, fixed].any(axis=1)[:, None] | covers[:, n:]
     counts = np.stack(
-        [np.bincount(rows, weights=column, minlength=len(floors)) for column in served.T]
+        [
+            np.bincount(rows, weights=column, minlength=len(floors))
+            for column in served.T
+        ]
     )
     return np.clip(floors - counts, 0, None).sum(axis=1).astype(np.int64)
 

@@ -73,9 +73,7 @@ class HeadSets:
 
     def take(self, chosen: Ints) -> "HeadSets":
         """Return some of the heads."""
-        return replace(
-            self, lit=self.lit[:, chosen], measured=self.measured[:, chosen]
-        )
+        return replace(self, lit=self.lit[:, chosen], measured=self.measured[:, chosen])
 
 
 def _of_heads(by_device: Mask, counts: Sequence[int]) -> Mask:

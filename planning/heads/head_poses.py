@@ -83,7 +83,9 @@ class HeadSource:
         return PlacedHead(
             world_from_head,
             tuple(
-                moved_to(_model(self.projectors, d), world_from_head @ d.head_from_device)
+                moved_to(
+                    _model(self.projectors, d), world_from_head @ d.head_from_device
+                )
                 for d in self.head.projectors
             ),
             tuple(

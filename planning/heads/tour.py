@@ -1,6 +1,6 @@
 """In which order stations are gone to: the shortest way that visits each once.
 
-Exact for few stations (Held and Karp 1962: the least way that ends at j after a set S is
+Exact for few (Held and Karp 1962: the least way over a set S that ends at j is
 ``min over i of way(S - j, i) + |P_i - P_j|``); for more, exchanges of two legs.
 """
 
@@ -40,7 +40,7 @@ def _held_karp(gaps: Array) -> list[int]:
 
 
 def _two_opt(gaps: Array) -> list[int]:
-    """From the nearest neighbours' way, reversals of parts as long as one is shorter."""
+    """From nearest neighbours, reversals of parts as long as one is shorter."""
     n = len(gaps)
     order, left = [0], set(range(1, n))
     while left:

@@ -11,11 +11,11 @@ from planning.model.document.ring_records import AxisTaken, RingAxis
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.projectors.projector_stage import ProjectorStage
 from planning.proofs.surviving_counts import SurvivingCount
+from planning.report.entries.station_entries import Stationed
 from planning.rig.mounted import Mounted
 from planning.rig.range_guard import Guard
 from planning.rig.rig import Rig
 from planning.rig.wishes import Wishes
-from planning.report.entries.station_entries import Stationed
 from planning.rings.ring_stage import RingStage
 from planning.scene.interest import Interest
 from planning.scene.lights import light_of

@@ -220,9 +220,7 @@ def _described(
     body = {} if device.body is None else {"body": device.body}
     name = {"existing": True, "name": device.existing} if device.existing else {}
     told = {
-        key: value
-        for key in ("model", "station")
-        if (value := getattr(device, key))
+        key: value for key in ("model", "station") if (value := getattr(device, key))
     }
     return kept | body | name | told
 

@@ -53,7 +53,9 @@ def stations_record(stationed: Stationed, devices: Devices) -> StationsRecord:
             StationRecord(
                 id=one.id,
                 world_from_station=np.asarray(pose).tolist(),
-                projectors=tuple(d.id for d in devices.projectors[p:][: one.n_projectors]),
+                projectors=tuple(
+                    d.id for d in devices.projectors[p:][: one.n_projectors]
+                ),
                 cameras=tuple(d.id for d in devices.cameras[c:][: one.n_cameras]),
                 **turned,
             )
