@@ -77,7 +77,9 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
         if not partial.request.evaluates:
             regions = with_small_floor(regions, partial.stage.candidates)
         certificates = with_fewer_needed(certificates, partial, clock)
-    overlaps, schedule = overlap_records(among, devices.projectors)
+    stationed = partial.stationed
+    moved = stationed is not None and stationed.record.kind != "heads"
+    overlaps, schedule = overlap_records(among, devices.projectors, moved=moved)
     surface = _surface(scene, devices, partial.ready)
     requirements = _final_requirements(among, claims, devices)
     projectors = entries.projector_records(among, devices, partial.rings, claims)
@@ -127,8 +129,8 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
         reconstruction=None,
         timings_s=dict(clock.seconds),
     )
-    if partial.stationed is not None:
-        stations = stations_record(partial.stationed, devices)
+    if stationed is not None:
+        stations = stations_record(stationed, devices)
         document = document.changed(stations=stations)
     if survival is not None:
         document = document.changed(survival=survival)

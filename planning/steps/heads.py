@@ -91,9 +91,7 @@ def _placed(
         one.named("" if head.cross else name)
         for name, one in zip(names, heads, strict=True)
     ]
-    reference = [
-        one.named(f"reference {k}") for k, one in enumerate((*heads, *found.heads))
-    ]
+    reference = [one.named(f"reference {k}") for k, one in enumerate(found.heads)]
     with clock.stage("heads", "heads: what their devices light and measure"):
         lights, views = stages_of(ready.scene, planned, reference)
     asked = found.cover.asked
@@ -114,7 +112,7 @@ def _placed(
         head=head.name,
         cross=head.cross,
         stations=(),
-        n_reference=len(reference),
+        n_reference=len(planned) + len(reference),
         count=count,
         **({} if way is None else {"way_m": way}),
     )

@@ -88,6 +88,8 @@ def _audit_shell(case: AuditCase, findings: AuditFindings) -> None:
     if standoff is None or play is None:
         return
     middle = standoff + space.object_radius_m
+    # A head's devices stand beside its origin, to which the standoff counts.
+    play += _lever_m(case.plan)
     for kind in case.kinds:
         radius, name = f"{kind.name}_radius_m", f"{kind.name}_standoff_m"
         tiled = getattr(space, name)
@@ -98,6 +100,15 @@ def _audit_shell(case: AuditCase, findings: AuditFindings) -> None:
             name,
             f"{tiled!r} m, but rig.standoff_m is {standoff:g} m",
         )
+
+
+def _lever_m(plan: RigPlan) -> float:
+    """How far from a head's origin a device of it is at most [m]; 0 without a head."""
+    head, planned = plan.document.rig.head, plan.document.stations
+    if head is None or planned is None:
+        return 0.0
+    places = [np.array(device.head_from_device)[:3, 3] for device in head.devices]
+    return float(max(np.sqrt(place @ place) for place in places))
 
 
 def origin_of(plan: RigPlan) -> Array:

@@ -1,0 +1,93 @@
+"""Heads, stations and steps of a turntable, for a person."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from planning.model.document.station_records import StationsRecord, TradeRow
+from planning.model.plan import RigPlan
+from planning.model.words import count_words, labelled
+
+_WORDS = {"heads": "head", "stations": "station", "turntable": "step"}
+_MOST = 8
+
+
+def fewest_words(plan: RigPlan) -> str:
+    """Return what is known of fewer heads, stations or steps; empty without any."""
+    told = plan.document.stations
+    if told is None or told.count is None:
+        return ""
+    count, word = told.count, _WORDS[told.kind]
+    over = f"over {count.n_candidates} candidates"
+    if count.needed > count.count:
+        return (
+            f"at least {count.lower_bound} {word}s proved {over}, {count.needed} "
+            f"suffice; at most {count.count} was asked"
+        )
+    found = count_words(count.count, word)
+    if count.lower_bound >= count.count:
+        text = f"{found}: proved {over}"
+    else:
+        text = f"{found}; at least {count.lower_bound} proved {over}"
+    if count.everywhere is not None:
+        text += f"; over every pose at least {count.everywhere}, by their light"
+    return text
+
+
+def station_lines(plan: RigPlan) -> list[str]:
+    """Return every station with its devices, and what trades against what."""
+    told = plan.document.stations
+    if told is None:
+        return []
+    lines = [
+        f"{one.id:<4} {', '.join((*one.projectors, *one.cameras))}{_turned(one.angle)}"
+        for one in told.stations
+    ]
+    label = f"{_WORDS[told.kind].upper()}S"
+    return ["", *labelled(label, [title_words(told), *lines, *trade_lines(told)])]
+
+
+def title_words(told: StationsRecord) -> str:
+    """Return what stands at the stations, in a sentence."""
+    n, word = len(told.stations), _WORDS[told.kind]
+    if told.kind == "turntable":
+        angles = [one.angle for one in told.stations if one.angle is not None]
+        shown = ", ".join(f"{np.degrees(a):.4g}" for a in angles[:_MOST])
+        more = ", ..." if len(angles) > _MOST else ""
+        return f"{count_words(n, word)} of the table at {shown}{more} degrees"
+    across = ", pairs across heads count" if told.cross else ""
+    if told.kind == "heads":
+        return f"{count_words(n, word)} {told.head}{across}"
+    way = (
+        "" if told.way_m is None else f", {1e3 * told.way_m:.0f} mm from first to last"
+    )
+    return f"{count_words(n, word)} of one {told.head}{way}"
+
+
+def trade_lines(told: StationsRecord) -> list[str]:
+    """Return the fewest steps, or stations, for other numbers of devices."""
+    if told.kind == "stations" and told.count is not None:
+        return list(_heads_or_stations(told.count.count))
+    return list(_steps(told.steps))
+
+
+def _heads_or_stations(count: int) -> Iterator[str]:
+    """How many stations several heads of the kind leave to each of them."""
+    rows = {heads: -(-count // heads) for heads in range(1, count + 1)}
+    shown = [h for h, n in rows.items() if h == 1 or n < rows[h - 1]]
+    yield "heads     " + " ".join(f"{heads:>4}" for heads in shown)
+    yield "stations  " + " ".join(f"{rows[heads]:>4}" for heads in shown)
+
+
+def _steps(rows: tuple[TradeRow, ...]) -> Iterator[str]:
+    if not rows:
+        return
+    yield "projectors  cameras  fewest steps  proved"
+    for row in rows:
+        steps = "none" if row.steps is None else str(row.steps)
+        devices = f"{row.projectors:>10}  {row.cameras:>7}"
+        yield f"{devices}  {steps:>12}  {row.lower_bound:>6}"
+
+
+def _turned(angle: float | None) -> str:
+    return "" if angle is None else f" at {np.degrees(angle):.4g} degrees"
