@@ -22,7 +22,7 @@ from .proof_lines import user_selection
 from .region_lines import worst_region
 from .robust_lines import robust_cost
 from .shortfall import Shortfall, missing
-from .station_lines import fewest_words
+from .station_lines import fewest_words, title_words
 from .summary import lost_in_field
 from .warning_lines import warnings
 

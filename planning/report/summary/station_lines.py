@@ -4,12 +4,19 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from planning.model.document.station_records import StationsRecord, TradeRow
+from geometry.arrays import Array
+from geometry.poses import pan_tilt_roll
+from planning.model.document.station_records import (
+    StationRecord,
+    StationsRecord,
+    TradeRow,
+)
 from planning.model.plan import RigPlan
 from planning.model.words import count_words, labelled
 
 _WORDS = {"heads": "head", "stations": "station", "turntable": "step"}
 _MOST = 8
+_HEADING = "position x, y, z [mm] of the head's origin   pan    tilt    roll   devices"
 
 
 def fewest_words(plan: RigPlan) -> str:
@@ -39,12 +46,24 @@ def station_lines(plan: RigPlan) -> list[str]:
     told = plan.document.stations
     if told is None:
         return []
-    lines = [
-        f"{one.id:<4} {', '.join((*one.projectors, *one.cameras))}{_turned(one.angle)}"
-        for one in told.stations
-    ]
-    label = f"{_WORDS[told.kind].upper()}S"
-    return ["", *labelled(label, [title_words(told), *lines, *trade_lines(told)])]
+    label, up = f"{_WORDS[told.kind].upper()}S", plan.requirements.workspace.up
+    lines = [title_words(told)]
+    if told.kind != "turntable":
+        lines.append(_HEADING)
+    lines += [_row(one, np.array(up)) for one in told.stations]
+    return ["", *labelled(label, [*lines, *trade_lines(told)])]
+
+
+def _row(one: StationRecord, up: Array) -> str:
+    """A station: the pose of the head, or how far the table has turned; its devices."""
+    devices = ", ".join((*one.projectors, *one.cameras))
+    if one.angle is not None:
+        return f"{one.id:<4} {np.degrees(one.angle):9.4g} degrees   {devices}"
+    pose = np.array(one.world_from_station)
+    x, y, z = 1e3 * pose[:3, 3]
+    pan, tilt, roll = np.round(np.degrees(pan_tilt_roll(pose[:3, :3], up)), 1) + 0.0
+    place = f"{one.id:<4} {x:9.1f} {y:9.1f} {z:9.1f}"
+    return f"{place}  {pan:9.1f} {tilt:7.1f} {roll:7.1f}   {devices}"
 
 
 def title_words(told: StationsRecord) -> str:
@@ -87,7 +106,3 @@ def _steps(rows: tuple[TradeRow, ...]) -> Iterator[str]:
         steps = "none" if row.steps is None else str(row.steps)
         devices = f"{row.projectors:>10}  {row.cameras:>7}"
         yield f"{devices}  {steps:>12}  {row.lower_bound:>6}"
-
-
-def _turned(angle: float | None) -> str:
-    return "" if angle is None else f" at {np.degrees(angle):.4g} degrees"
