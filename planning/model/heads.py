@@ -80,8 +80,8 @@ class MeasuringVolume:
         return near + share[..., None] * (far - near)
 
     def plane(self, depth: float, n: int = 9) -> Array:
-        """Return n x n points evenly over the rectangle at a depth, (n n, 3) [m]."""
-        steps = np.linspace(-0.5, 0.5, n)
+        """Return the middles of n x n equal parts of the rectangle at a depth [m]."""
+        steps = (np.arange(n) + 0.5) / n - 0.5
         across = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
         across = across * self.size_at(np.array(depth))
         return np.concatenate([across, np.full((len(across), 1), depth)], axis=1)
@@ -234,7 +234,8 @@ class Turntable:
     @property
     def angles(self) -> tuple[float, ...]:
         """Angles of the steps [rad], from 0 up; none where any angle may be set."""
-        return tuple(2.0 * math.pi * k / self.steps for k in range(self.steps or 0))
+        steps = self.steps or 0
+        return tuple(2.0 * math.pi * k / steps for k in range(steps))
 
 
 @dataclass(frozen=True)

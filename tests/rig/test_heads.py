@@ -5,16 +5,13 @@ import json
 
 import numpy as np
 import pytest
-from support.head_rigs import LENS, RIG, SHARP
+from support.head_rigs import HEAD, LENS, RIG, SHARP
 
 from planning import load_rig
 from planning.model.document.input_records import RigRecord
 from planning.model.errors import RigError
-from planning.model.heads import (
-    Head,
-    HeadDevice,
-    MeasuringVolume,
-)
+from planning.model.heads import Head, HeadDevice, MeasuringVolume
+from planning.rig.devices.rig_heads import seen_share, sees
 
 
 def rig_of(*, without=(), device=None, **head):
@@ -210,6 +207,45 @@ def test_a_pair_that_shares_nothing_is_refused_and_one_that_shares_little_told()
             **wide,
             device={"position_mm": [900.0, 0.0, 0.0], "aim_mm": [700.0, 0.0, 500.0]},
         )
+
+
+def test_of_two_cameras_the_farther_makes_the_baseline_and_either_may_see():
+    wide = {"near_size_mm": [560.0, 150.0], "far_size_mm": [560.0, 150.0]}
+    other = {
+        "name": "d",
+        "position_mm": [-80.0, 0.0, 0.0],
+        "aim_mm": [-200.0, 0.0, 500.0],
+    }
+    one = copy.deepcopy(HEAD["camera"][0]) | {"aim_mm": [200.0, 0.0, 500.0]}
+    both = rig_of(**wide, camera=[one, other])
+    assert both.head.baseline_m == pytest.approx(0.15)
+    assert [(p.name, c.name) for p, c in both.head.pairs] == [("p", "c"), ("p", "d")]
+    points = both.head.volume.plane(0.5)
+    alone = [
+        seen_share(rig.head, rig.optics_of, points)
+        for rig in (rig_of(**wide, camera=[each]) for each in (one, other))
+    ]
+    together = seen_share(both.head, both.optics_of, points)
+    assert together > max(alone) + 0.1
+    assert together <= sum(alone)
+
+
+def test_what_a_device_sees_is_what_its_image_and_focus_hold():
+    """A camera 150 mm aside: the edges of its field and of its focus by hand."""
+    rig = load_rig(RIG)
+    camera, optics = rig.head.cameras[0], rig.camera_device()
+    pose = camera.head_from_device
+    local = np.array(
+        [
+            [0.249, 0.0, 0.5],  # 1000 px at f = 1000: half a metre at a metre
+            [0.251, 0.0, 0.5],
+            [0.0, 0.0, 0.301],
+            [0.0, 0.0, 0.299],
+            [0.0, 0.0, 0.901],
+        ]
+    )
+    points = local @ pose[:3, :3].T + pose[:3, 3]
+    assert sees(camera, optics, points).tolist() == [True, False, True, False, False]
 
 
 def test_a_housing_that_hides_the_volume_from_a_device_outside_is_refused():

@@ -53,7 +53,9 @@ def seen_share(head: Head, optics: Optics, points: Array) -> float:
     return float(np.logical_or.reduce(pairs).mean())
 
 
-def model_faults(table: RigTable, models: Callable[[Kind], Sequence[Model]]) -> list:
+def model_faults(
+    table: RigTable, models: Callable[[Kind], Sequence[Model]]
+) -> list[str]:
     """Return a sentence for each table that a head makes void, or that lacks one."""
     return [*_carried(table), *_unmodelled(table, models)]
 

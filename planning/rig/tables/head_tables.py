@@ -249,7 +249,7 @@ def check_housing(
 
 def _in_box(body: Body, points: Array) -> Mask:
     off = np.abs(points - np.array(body.centre_m))
-    return (off <= np.array(body.half_m)).all(axis=-1)
+    return np.asarray((off <= np.array(body.half_m)).all(axis=-1))
 
 
 def _hidden(body: Body, start: Array, points: Array) -> Mask:
