@@ -45,6 +45,7 @@ from .steps.surviving import (
     one_more_for_losses,
     placed_to_survive,
 )
+from .steps.turntable import planned_on_turntable
 
 Keep = Callable[[RigPlan], None]
 Checked = Callable[[RigPlan, Verification], None]
@@ -229,6 +230,8 @@ def _planned(
     """
     if request.wishes.max_heads is not None:
         return planned_heads(request, clock)
+    if request.rig.turntable is not None:
+        return planned_on_turntable(request, clock)
     partial = larger = begun = _first_plan(request, clock)
     first = None
     try:

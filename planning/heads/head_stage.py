@@ -48,9 +48,11 @@ def stages_of(
         candidates,
     )
     target = scene.target_samples(DRAWS.cameras)
-    lit = lit_stages(scene, projectors, target) == LIT
+    # Reference cameras without a station measure with the planned projectors alone.
+    lamps = tuple(p for k, p in enumerate(projectors) if k < n_projectors or p.station)
+    lit = lit_stages(scene, lamps, target) == LIT
     bright = np.flatnonzero(lit[:, :n_projectors].any(axis=1))
-    samples = LitSamples.of(projectors, target.take(bright), lit[bright])
+    samples = LitSamples.of(lamps, target.take(bright), lit[bright])
     views = CandidateViews(scene, cameras)
     seen = views.on(samples.target)
     measured = measured_by(scene, cameras, samples, seen)
