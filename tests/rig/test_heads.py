@@ -8,10 +8,12 @@ import pytest
 from support.head_rigs import HEAD, LENS, RIG, SHARP
 
 from planning import load_rig
+from planning.model.bodies import Body
 from planning.model.document.input_records import RigRecord
 from planning.model.errors import RigError
 from planning.model.heads import Head, HeadDevice, MeasuringVolume
 from planning.rig.devices.rig_heads import seen_share, sees
+from planning.rig.tables.head_tables import check_housing
 
 
 def rig_of(*, without=(), device=None, **head):
@@ -108,6 +110,10 @@ def test_a_file_lays_figures_over_the_heads_and_their_sources_go():
     assert other.head.figures.sources == {"near_mm": "read: a"}
     box = rig.replace(head={"volume_mm": [200.0, 100.0, 160.0]})
     assert box.head.volume.near_m == pytest.approx(0.42)
+    frustum = {key: HEAD[key] for key in ("near_mm", "far_mm")}
+    sizes = {key: HEAD[key] for key in ("near_size_mm", "far_size_mm")}
+    again = box.replace(head=frustum | sizes)
+    assert again.head.volume == MeasuringVolume(0.4, 0.6, (0.2, 0.15), (0.3, 0.225))
     # By its own name a head is another one, whole.
     with pytest.raises(RigError, match=r"`head.camera` is missing"):
         rig.replace(head={"name": "other"})
@@ -256,6 +262,32 @@ def test_a_housing_that_hides_the_volume_from_a_device_outside_is_refused():
         rig_of(body=body, device=behind)
     beside = {"position_mm": [0.0, 200.0, -60.0]}
     assert rig_of(body=body, device=beside).head.body is not None
+
+
+def test_a_housing_behind_a_device_or_beyond_the_volume_hides_nothing():
+    volume = load_rig(RIG).head.volume
+    ahead = {"p": np.array([0.0, 0.0, -0.07]), "c": np.zeros(3)}
+    behind = Body((0.0, 0.0, -0.07), (0.2, 0.2, 0.03))
+    check_housing(behind, volume, ahead)
+    with pytest.raises(ValueError, match="hides the whole measuring volume from 'c'"):
+        check_housing(behind, volume, ahead | {"c": np.array([0.0, 0.0, -0.2])})
+    # The sights of one beside it pass, though they cross each of its slabs.
+    narrow = MeasuringVolume(0.4, 0.6, (0.01, 0.01), (0.01, 0.01))
+    housing = Body((0.0, 0.0, 0.0), (0.03, 0.03, 0.03))
+    beside = {"p": np.zeros(3), "c": np.array([0.0, 0.2, -0.06])}
+    check_housing(housing, narrow, beside)
+    # One that looks back, from beyond.
+    beyond = Body((0.0, 0.0, 1.0), (0.5, 0.5, 0.1))
+    check_housing(beyond, volume, {"p": np.array([0.0, 0.0, 1.0]), "c": np.zeros(3)})
+
+
+def test_devices_are_sharp_by_their_own_distance_not_by_the_standoff():
+    """A camera 200 mm behind the head's origin, sharp from 550 mm on."""
+    tables = copy.deepcopy(RIG)
+    tables["camera"]["range_mm"] = [550.0, 900.0]
+    tables["head"]["camera"][0]["position_mm"] = [150.0, 0.0, -200.0]
+    rig = load_rig(tables)
+    assert rig.standoff_m < rig.camera_device().range_m[0]
 
 
 @pytest.mark.parametrize(

@@ -256,9 +256,9 @@ def _hidden(body: Body, start: Array, points: Array) -> Mask:
     """Whether the sight from a start to each point passes the box, by its slabs."""
     along = points - start
     centre, half = np.array(body.centre_m), np.array(body.half_m)
+    # Along a slab the ends are both at the same infinity outside, at either inside.
     with np.errstate(divide="ignore", invalid="ignore"):
         one, other = (centre - half - start) / along, (centre + half - start) / along
     enter = np.nanmax(np.minimum(one, other), axis=-1)
     leave = np.nanmin(np.maximum(one, other), axis=-1)
-    beside = ((along == 0.0) & (np.abs(start - centre) > half)).any(axis=-1)
-    return (enter < leave) & (leave > 0.0) & (enter < 1.0) & ~beside
+    return (enter < leave) & (leave > 0.0) & (enter < 1.0)
