@@ -42,6 +42,7 @@ class _Traded:
     rows: tuple[TradeRow, ...]
     taken: tuple[int, int]
     steps: Steps
+    most: int
 
 
 def planned_on_turntable(
@@ -72,7 +73,7 @@ def planned_on_turntable(
         if spare:
             clock.say("  fresh samples fall short: more is asked of the others")
             asked = StepSearch.of(_asking_more(scene, spare), sets)
-            steps = asked.fewest(*traded.taken) or steps
+            steps = asked.fewest(*traded.taken, traded.most)[0] or steps
         partial = _placed(ready, search, traded, steps, clock)
         plan = write_plan(partial, clock)
         if not any(short_of(plan)):
@@ -89,23 +90,21 @@ def _traded(search: StepSearch, request: PlanRequest, clock: Stopwatch) -> _Trad
     rows: list[TradeRow] = []
     found: dict[tuple[int, int], Steps] = {}
     for pair in pairs_of_counts(lamps, eyes):
-        steps = search.fewest(*pair)
-        within = steps is not None and len(steps.angles) <= most
+        steps, least = search.fewest(*pair, most)
         rows.append(
             TradeRow(
                 projectors=pair[0],
                 cameras=pair[1],
                 steps=None if steps is None else len(steps.angles),
-                lower_bound=0 if steps is None else steps.lower_bound,
+                lower_bound=least,
             )
         )
-        if steps is not None and within:
+        if steps is not None:
             found[pair] = steps
             clock.say(
                 f"  {count_words(pair[0], 'projector')} and "
                 f"{count_words(pair[1], 'camera')}: "
-                f"{count_words(len(steps.angles), 'step')}, at least "
-                f"{steps.lower_bound}"
+                f"{count_words(len(steps.angles), 'step')}, at least {least}"
             )
     if not found:
         raise InfeasibleLimitsError(
@@ -117,7 +116,7 @@ def _traded(search: StepSearch, request: PlanRequest, clock: Stopwatch) -> _Trad
         taken = next(iter(found))
     else:
         taken = min(found, key=lambda pair: (len(found[pair].angles), sum(pair)))
-    return _Traded(tuple(rows), taken, found[taken])
+    return _Traded(tuple(rows), taken, found[taken], most)
 
 
 def _asking_more(scene: Scene, spare: float) -> Scene:

@@ -1,11 +1,12 @@
 """The fewest steps of a turntable, for so many projectors and cameras before it.
 
-A choice of places is a cover of its own: its sets are the angles of the table, and what
-is asked is the same for every choice. With one projector its place on its circle is
-free (turn the table, and any other is as good). So all choices of it and of one or two
-cameras are looked at: one whose k largest sets hold together fewer samples than are
-asked needs more than k steps; the others are solved, those of the smallest k first. The
-bound of other numbers of devices leaves the cameras out::
+With one projector its place on its circle is free: turn the table, and any other is as
+good. So for k = 1, 2, ... all sets J of k angles are looked at for each circle: those
+that light too little, or where even all cameras together measure too little, are left
+out; for the others the places of cameras are tried, one, two or three at once. What is
+found first takes the fewest steps of all places of the lattice, and the search is the
+proof. Places of several projectors are the best found one after the other, and for
+their number the bound leaves out who pairs with whom::
 
     steps >= ceil(K / P),  K the fewest pairs of place and angle that any cameras serve
 """
@@ -13,12 +14,13 @@ bound of other numbers of devices leaves the cameras out::
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.arrays import Ints
-from planning.heads.head_cover import HeadCover, HeadSets
+from planning.heads.head_cover import HeadCover
 from planning.scene.placed_bodies import Device
 from planning.scene.scene import Scene
 from solvers import solve_cover
@@ -26,13 +28,16 @@ from solvers import solve_cover
 from .table_sets import Place, TableSets
 
 _BUDGET = 2e8
-# Choices that are solved for each number of devices, at most.
-_SOLVED = 300
-# Circles from which places of several projectors are sought, one after another.
-_BEGINNINGS = 4
-_NEVER = 1 << 30
+# Sets of angles of which cameras are tried, at most, of each number and circle.
+_TRIED = 4000
+# Sets of angles at most that are looked at all; of more the number isn't proved.
+_ALL = 800_000
+# Circles from which places of several projectors are sought.
+_BEGINNINGS = 2
+_AT_ONCE = 20_000
+_SEARCHED = "every choice of places and angles"
+_SERVED = "what any cameras serve at a step"
 
-_Choice = tuple[tuple[Place, ...], tuple[Place, ...]]
 _Bits = NDArray[np.uint8]
 
 
@@ -41,8 +46,8 @@ class Steps:
     """Places of devices, and the angles at which they measure.
 
     Attributes:
-        lamps: Places of the projectors, `eyes` of the cameras, as the room has them.
-        angles: Chosen ones, as places of the table, (k,).
+        lamps: Places of the projectors, `eyes` of the cameras, in the room.
+        angles: Chosen ones, as places of the table, ascending, (k,).
         lower_bound: Proven least number of angles for as many devices, wherever on the
             lattice they are.
         proof: What proves it.
@@ -53,6 +58,23 @@ class Steps:
     angles: Ints
     lower_bound: int
     proof: str
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """What devices do at each of A angles, as bits of samples.
+
+    Attributes:
+        lamps: Places of projectors.
+        near: Places of cameras that measure anything with them.
+        lit: Shape (A, b).
+        measured: By each of these cameras, shape (n_near, A, b).
+    """
+
+    lamps: tuple[Place, ...]
+    near: tuple[Place, ...]
+    lit: _Bits
+    measured: _Bits
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,169 +96,194 @@ class StepSearch:
         """Return the search for what a scene asks."""
         return cls(scene, sets, HeadCover.of(scene, sets.everywhere()))
 
-    def fewest(self, n_lamps: int, n_eyes: int) -> Steps | None:
-        """Return the fewest steps for so many devices; None: no choice was enough."""
-        best, open_ = None, _NEVER
-        for k, (few, choice) in enumerate(self._promising(n_lamps, n_eyes)):
-            if k >= _SOLVED or (best is not None and few >= len(best.angles)):
-                open_ = min(open_, few)
-                break
-            found = self._solved(choice)
-            if found is None:
-                continue
-            open_ = min(open_, found.lower_bound)
-            if best is None or len(found.angles) < len(best.angles):
-                best = found
-        if best is None:
-            return None
-        bound, proof = self.least(n_lamps) or 1, "what any cameras serve at a step"
-        if n_lamps == 1 and n_eyes <= 2:
-            each = min(open_, len(best.angles))
-            if each > bound:
-                bound, proof = each, "every choice of places"
-        return replace(best, lower_bound=min(bound, len(best.angles)), proof=proof)
+    def fewest(self, n_lamps: int, n_eyes: int, most: int) -> tuple[Steps | None, int]:
+        """Return the fewest steps for so many devices, and what is proved of them.
 
-    def least(self, n_lamps: int) -> int | None:
-        """Return the fewest steps of so many projectors with any cameras at any place.
-
-        None: no number of them is enough.
+        None: at most so many steps weren't found to be enough.
         """
-        alone = [self.sets.steps_of([(e, 0)], None) for e in range(self._n_circles)]
-        if n_lamps == 1:
-            counts = (self._count(one) for one in alone)
-            return min((n for n in counts if n is not None), default=None)
-        together = alone[0]
-        for one in alone[1:]:
+        seen = self._alone if n_lamps == 1 else self._seen(n_lamps)
+        least, refuted = self._least(n_lamps, most), n_lamps == 1
+        for count in range(least, most + 1):
+            for one in seen:
+                found, whole = self._at(one, count, n_eyes)
+                if found is not None:
+                    proof = _SEARCHED if refuted else _SERVED
+                    return replace(found, lower_bound=least, proof=proof), least
+                refuted &= whole
+            if refuted:
+                least = count + 1
+        return None, least
+
+    def _least(self, n_lamps: int, most: int) -> int:
+        """Fewest steps of so many projectors with any cameras at any place."""
+        every = [self.sets.steps_of([(e, 0)], None) for e in range(self._n_circles)]
+        together = every[0]
+        for one in every[1:]:
             together = together.beside(one)
-        count = self._count(together)
-        return None if count is None else -(-count // n_lamps)
-
-    def _count(self, sets: HeadSets) -> int | None:
-        cover = replace(self.cover, sets=sets)
-        if cover.lacking(np.arange(sets.lit.shape[1])):
-            return None
+        cover = replace(self.cover, sets=together)
+        if cover.lacking(np.arange(together.lit.shape[1])):
+            return most + 1
         solution = solve_cover(cover.problem, seed=self.scene.seed, budget=_BUDGET)
-        return int(np.ceil(solution.lower_bound - 1e-9))
+        return -(-int(np.ceil(solution.lower_bound - 1e-9)) // n_lamps)
 
-    def _solved(self, choice: _Choice) -> Steps | None:
-        """The fewest angles of a choice of places; None: it isn't one, or not enough."""
-        lamps, eyes = choice
-        lattice = self.sets.lattice
+    def _at(self, seen: _Seen, count: int, n_eyes: int) -> tuple[Steps | None, bool]:
+        """The first choice of so many angles that is enough, and whether all were seen.
+
+        Those of most that any cameras measure come first.
+        """
+        angles, whole = self._angles(seen, count)
+        for row in angles[:_TRIED]:
+            self.scene.check_cancelled()
+            bits = np.bitwise_or.reduce(seen.measured[:, row], axis=1)
+            for chosen in _together(bits, n_eyes, self.cover.asked[1]):
+                found = self._stands(seen, chosen, row)
+                if found is not None:
+                    return found, whole
+        return None, whole and len(angles) <= _TRIED
+
+    def _angles(self, seen: _Seen, count: int) -> tuple[Ints, bool]:
+        """Sets of angles (m, count) that light enough and where cameras may measure it.
+
+        And whether all sets were looked at.
+        """
+        lit, measured = self.cover.asked
+        anyone = np.bitwise_or.reduce(seen.measured, axis=0)
+        kept: list[Ints] = []
+        held: list[Ints] = []
+        looked = 0
+        for part in _subsets(len(seen.lit), count):
+            looked += len(part)
+            enough = _count(_joined(seen.lit, part)) >= lit
+            part = part[enough]
+            counts = _count(_joined(anyone, part))
+            kept.append(part[counts >= measured])
+            held.append(counts[counts >= measured])
+            if looked >= _ALL:
+                break
+        order = np.argsort(-np.concatenate(held), kind="stable")
+        return np.concatenate(kept)[order], looked < _ALL
+
+    def _stands(
+        self, seen: _Seen, chosen: tuple[int, ...], angles: Ints
+    ) -> Steps | None:
+        """Places in the room, if it holds them and floors of regions are met, too."""
+        lattice, eyes = self.sets.lattice, tuple(seen.near[k] for k in chosen)
         devices: list[tuple[Device, int]] = [
-            *((lattice.projectors[e], i) for e, i in lamps),
+            *((lattice.projectors[e], i) for e, i in seen.lamps),
             *((lattice.cameras[f], k) for f, k in eyes),
         ]
         begins = lattice.begins(devices)
-        if not len(begins):
+        cover = replace(self.cover, sets=self.sets.steps_of(seen.lamps, eyes))
+        if not len(begins) or cover.lacking(angles):
             return None
-        sets = self.sets.steps_of(lamps, eyes)
-        cover = replace(self.cover, sets=sets)
-        if cover.lacking(np.arange(lattice.n_places)):
-            return None
-        solution = solve_cover(cover.problem, seed=self.scene.seed, budget=_BUDGET)
-        bound = int(np.ceil(solution.lower_bound - 1e-9))
         # Devices that stand by so much further on see the same at angles as much on.
-        from_zero = np.isin(begins, -solution.selected % lattice.n_places)
+        from_zero = np.isin(begins, -angles % lattice.n_places)
         by = int(begins[np.argmax(from_zero)])
-        lamps, eyes = (_moved(at, by, lattice.n_places) for at in (lamps, eyes))
-        angles = np.sort((solution.selected + by) % lattice.n_places)
-        return Steps(lamps, eyes, angles, bound, solution.proof)
-
-    def _promising(self, n_lamps: int, n_eyes: int) -> list[tuple[int, _Choice]]:
-        """Choices that may be enough with the least steps of each, fewest first."""
-        found: list[tuple[int, _Choice]] = []
-        for lamps in self._lamps(n_lamps):
-            dark = self._few(self._packed(lamps, None)[None], light=True)[0]
-            if dark == _NEVER:
-                continue
-            near = self._near(lamps)
-            bits = np.stack([self._packed(lamps, eye) for eye in near])
-            for eyes, counts in self._eyes(bits, n_eyes, every=n_lamps == 1):
-                found += [
-                    (int(max(few, dark)), (lamps, tuple(near[k] for k in chosen)))
-                    for chosen, few in zip(eyes, counts, strict=True)
-                    if few < _NEVER
-                ]
-        return sorted(found, key=lambda one: one[0])
-
-    def _lamps(self, count: int) -> Iterator[tuple[Place, ...]]:
-        """Places of projectors: one of each circle; of several the best beside it."""
-        alone = [((e, 0),) for e in range(self._n_circles)]
-        if count == 1:
-            yield from alone
-            return
-        least = [self._lacking_light(one) for one in alone]
-        for k in np.argsort(least, kind="stable")[:_BEGINNINGS]:
-            chosen: tuple[Place, ...] = alone[int(k)]
-            while len(chosen) < count:
-                others = [
-                    (e, i)
-                    for e in range(self._n_circles)
-                    for i in range(self.sets.lattice.n_places)
-                    if (e, i) not in chosen
-                ]
-                short = [self._lacking_light((*chosen, one)) for one in others]
-                chosen = (*chosen, others[int(np.argmin(short))])
-            yield chosen
-
-    def _lacking_light(self, lamps: tuple[Place, ...]) -> float:
-        """How much less than everything a few steps of projectors light on average."""
-        lit = self.sets.steps_of(lamps, ()).lit
-        return -float(lit.any(axis=1).sum()) - lit.mean()
-
-    def _near(self, lamps: tuple[Place, ...]) -> list[Place]:
-        places = self.sets.lattice.n_places
-        every = (
-            (f, (k + i) % places) for e, i in lamps for f, k in self.sets.near((e, 0))
+        return Steps(
+            _moved(seen.lamps, by, lattice.n_places),
+            _moved(eyes, by, lattice.n_places),
+            np.sort((angles + by) % lattice.n_places),
+            1,
+            "",
         )
-        return list(dict.fromkeys(every))
 
-    def _packed(self, lamps: tuple[Place, ...], eye: Place | None) -> _Bits:
-        """What a camera measures with projectors at each angle, as bits; None: light."""
-        sets = self.sets.steps_of(lamps, () if eye is None else (eye,))
-        rows = sets.lit if eye is None else sets.measured
-        return np.packbits(rows.T, axis=1)
+    @cached_property
+    def _alone(self) -> list[_Seen]:
+        return self._seen(1)
 
-    def _eyes(
-        self, bits: _Bits, count: int, *, every: bool
-    ) -> Iterator[tuple[list[tuple[int, ...]], Ints]]:
-        """Yield choices of cameras, by rows of bits (k, A, b), and their least steps.
-
-        Of one or two all, if `every`; else for each the best beside it, one by one.
-        """
-        n = len(bits)
-        if count == 1:
-            yield [(k,) for k in range(n)], self._few(bits)
-            return
-        for k in range(n):
-            chosen, together = (k,), bits[k]
-            while len(chosen) < count:
-                joined = together | bits
-                last = len(chosen) == count - 1
-                if last and every and count == 2:
-                    after = range(k + 1, n)
-                    yield [(k, j) for j in after], self._few(joined[k + 1 :])
-                    break
-                gained = np.bitwise_count(joined).sum(axis=(1, 2), dtype=np.int64)
-                gained[list(chosen)] = -1
-                best = int(np.argmax(gained))
-                chosen, together = (*chosen, best), joined[best]
-            else:
-                yield [chosen], self._few(together[None])
-
-    def _few(self, bits: _Bits, *, light: bool = False) -> Ints:
-        """The least k whose k largest sets hold what is asked together, (m,)."""
-        asked = self.cover.asked[0 if light else 1]
-        counts = np.bitwise_count(bits).sum(axis=2, dtype=np.int64)
-        most = np.cumsum(-np.sort(-counts, axis=1), axis=1)
-        few = 1 + np.argmax(most >= asked, axis=1)
-        whole = np.bitwise_or.reduce(bits, axis=1)
-        reached = np.bitwise_count(whole).sum(axis=1, dtype=np.int64)
-        return np.where(reached >= asked, few, _NEVER)
+    def _seen(self, n_lamps: int) -> list[_Seen]:
+        return [_seen(self.sets, lamps) for lamps in self._lamps(n_lamps)]
 
     @cached_property
     def _n_circles(self) -> int:
         return len(self.sets.lattice.projectors)
+
+    def _lamps(self, count: int) -> Iterator[tuple[Place, ...]]:
+        """Yield places of projectors: one of each circle, or the best beside it."""
+        alone = [((e, 0),) for e in range(self._n_circles)]
+        if count == 1:
+            yield from alone
+            return
+        order = np.argsort([-self._light(one) for one in alone], kind="stable")
+        places = range(self.sets.lattice.n_places)
+        for k in order[:_BEGINNINGS]:
+            chosen: tuple[Place, ...] = alone[int(k)]
+            while len(chosen) < count:
+                every = product(range(self._n_circles), places)
+                others = [one for one in every if one not in chosen]
+                light = [self._light((*chosen, one)) for one in others]
+                chosen = (*chosen, others[int(np.argmax(light))])
+            yield chosen
+
+    def _light(self, lamps: tuple[Place, ...]) -> float:
+        """How much projectors light at all angles together, then on average."""
+        lit = self.sets.steps_of(lamps, ()).lit
+        return float(lit.any(axis=1).sum()) + float(lit.mean())
+
+
+def _seen(sets: TableSets, lamps: tuple[Place, ...]) -> _Seen:
+    places = sets.lattice.n_places
+    every = ((f, (k + i) % places) for e, i in lamps for f, k in sets.near((e, 0)))
+    near = tuple(dict.fromkeys(every))
+    light = _packed(sets.steps_of(lamps, ()).lit)
+    measured = [_packed(sets.steps_of(lamps, (eye,)).measured) for eye in near]
+    shape = (len(near), *light.shape)
+    return _Seen(lamps, near, light, np.array(measured, np.uint8).reshape(shape))
+
+
+def _packed(rows: NDArray[np.bool_]) -> _Bits:
+    return np.packbits(rows.T, axis=1)
+
+
+def _joined(bits: _Bits, sets: Ints) -> _Bits:
+    """What sets (m, k) of rows (A, b) hold together, (m, b)."""
+    together = np.zeros((len(sets), bits.shape[1]), dtype=np.uint8)
+    for column in sets.T:
+        together |= bits[column]
+    return together
+
+
+def _count(bits: _Bits) -> Ints:
+    return np.bitwise_count(bits).sum(axis=-1, dtype=np.int64)
+
+
+def _subsets(n: int, count: int) -> Iterator[Ints]:
+    """Yield all sets of so many of n, many at once, (m, count)."""
+    every = combinations(range(n), count)
+    while True:
+        part = [one for one, _ in zip(every, range(_AT_ONCE), strict=False)]
+        if not part:
+            return
+        yield np.array(part, dtype=np.int64)
+
+
+def _together(bits: _Bits, count: int, asked: int) -> Iterator[tuple[int, ...]]:
+    """Yield which rows (n, b), one to three at once, hold enough; the most first."""
+    n = len(bits)
+    if count == 1:
+        held = _count(bits)
+        for k in np.argsort(-held, kind="stable"):
+            if held[k] < asked:
+                return
+            yield (int(k),)
+        return
+    alone = _count(bits)
+    best = int(alone.max(initial=0))
+    found: list[tuple[int, tuple[int, ...]]] = []
+    for k in range(n - count + 1):
+        if alone[k] + (count - 1) * best < asked:
+            continue
+        joined = bits[k] | bits[k + 1 :]
+        if count == 2:
+            held = _count(joined)
+            good = np.flatnonzero(held >= asked)
+            found += [(-int(held[j]), (k, k + 1 + int(j))) for j in good]
+            continue
+        for rest in _together(joined, count - 1, asked):
+            held = int(_count(np.bitwise_or.reduce(joined[list(rest)])))
+            found.append((-held, (k, *(k + 1 + j for j in rest))))
+    for _, chosen in sorted(found):
+        yield chosen
 
 
 def _moved(at: tuple[Place, ...], by: int, n_places: int) -> tuple[Place, ...]:
@@ -245,5 +292,5 @@ def _moved(at: tuple[Place, ...], by: int, n_places: int) -> tuple[Place, ...]:
 
 def pairs_of_counts(most_lamps: int, most_eyes: int) -> list[tuple[int, int]]:
     """Return numbers of projectors and cameras, fewest devices first."""
-    every = [(p, c) for p in range(1, most_lamps + 1) for c in range(1, most_eyes + 1)]
+    every = product(range(1, most_lamps + 1), range(1, most_eyes + 1))
     return sorted(every, key=lambda pair: (sum(pair), pair))
