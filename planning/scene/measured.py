@@ -228,9 +228,10 @@ def furthest_failure(
     """Return how far samples come over all pairs: index in `CAUSES`, or `MEASURED`."""
     furthest = np.zeros(len(lit.target), dtype=np.int8)
     for camera in cameras:
-        scene.check_cancelled()
         seen = view_of(scene, camera, lit.target)
-        furthest = np.maximum(furthest, seen.first_violated)
+        with_it = [meet(station, camera.station) for station in lit.stations]
+        first = np.where(lit.lit[:, with_it].any(axis=1), seen.first_violated, 0)
+        furthest = np.maximum(furthest, first.astype(np.int8))
         for pair in pairs_of(scene.requirements.triangulation, lit, seen):
             chosen = pair.samples
             furthest[chosen] = np.maximum(furthest[chosen], pair.first_violated)
@@ -275,7 +276,7 @@ def measured_fold(pairs: NDArray[np.bool_], views: int) -> NDArray[np.bool_]:
 
 
 def without_projector(pairs: NDArray[np.bool_], p: int) -> NDArray[np.bool_]:
-    """Return the pairs that are left without a projector."""
+    """Return the pairs left without a projector."""
     return np.delete(pairs, p, axis=2)
 
 

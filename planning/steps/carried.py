@@ -53,7 +53,11 @@ def check_carried(request: PlanRequest) -> None:
         raise InputError(
             f"{named}, which is planned with pattern 'dense', not {wishes.pattern!r}"
         )
+    table, bodies = rig.turntable, ("projector", "camera")
+    housed = any(model.body for kind in bodies for model in rig.models(kind))
     unable = {
+        "what stands still in the light": bool(table and table.still),
+        "a [body] of devices": bool(table and housed),
         "views": (wishes.views or 1) > 1,
         "survive": wishes.survive > 0,
         "robust": wishes.robust is not None,

@@ -1,12 +1,12 @@
 """The fewest steps of a turntable, for so many projectors and cameras before it.
 
-With one projector its place on its circle is free: turn the table, and any other is as
-good. So for k = 1, 2, ... all sets J of k angles are looked at for each circle: those
-that light too little, or where even all cameras together measure too little, are left
-out; for the others the places of cameras are tried, one, two or three at once. What is
-found first takes the fewest steps of all places of the lattice, and the search is the
-proof. Places of several projectors are the best found one after the other, and for
-their number the bound leaves out who pairs with whom::
+The place of the first projector on its circle is free: turn the table, and any other is
+as good. So for k = 1, 2, ... all sets J of k angles are looked at for all places of one
+or two projectors: those that light too little, or where even all cameras together
+measure too little, are left out; for the others the places of cameras are tried, one,
+two or three at once. What is found first takes the fewest steps of all places of the
+lattice, and the search is the proof. Where it was cut the bound leaves out who pairs
+with whom::
 
     steps >= ceil(K / P),  K the fewest pairs of place and angle that any cameras serve
 """
@@ -14,7 +14,8 @@ their number the bound leaves out who pairs with whom::
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations, product
+from itertools import combinations, combinations_with_replacement, product
+from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,12 +29,9 @@ from solvers import solve_cover
 from .table_sets import Place, TableSets
 
 _BUDGET = 2e8
-# Sets of angles of which cameras are tried, at most, of each number and circle.
-_TRIED = 4000
-# Sets of angles at most that are looked at all; of more the number isn't proved.
-_ALL = 800_000
-# Circles from which places of several projectors are sought.
-_BEGINNINGS = 2
+# Sets of angles at most that are looked at, for all places of as many projectors, and
+# of which cameras are tried; of more the number isn't proved.
+_ALL, _TRIED = 20_000_000, 4000
 _AT_ONCE = 20_000
 _SEARCHED = "every choice of places and angles"
 _SERVED = "what any cameras serve at a step"
@@ -61,20 +59,31 @@ class Steps:
 
 
 @dataclass(frozen=True, eq=False)
-class _Seen:
-    """What devices do at each of A angles, as bits of samples.
+class _Circle:
+    """What a projector at place 0 of its circle does at each angle, as bits of samples.
 
     Attributes:
-        lamps: Places of projectors.
-        near: Places of cameras that measure anything with them.
         lit: Shape (A, b).
-        measured: By each of these cameras, shape (n_near, A, b).
+        anyone: What any cameras measure with it, shape (A, b).
+        measured: What a camera does, by its place, shape (A, b) each.
     """
 
-    lamps: tuple[Place, ...]
-    near: tuple[Place, ...]
     lit: _Bits
-    measured: _Bits
+    anyone: _Bits
+    measured: dict[Place, _Bits]
+
+    @classmethod
+    def of(cls, sets: TableSets, e: int) -> "_Circle":
+        """Return what the projector of a circle does."""
+        lamp = ((e, 0),)
+        return cls(
+            _packed(sets.steps_of(lamp, ()).lit),
+            _packed(sets.steps_of(lamp, None).measured),
+            {
+                eye: _packed(sets.steps_of(lamp, (eye,)).measured)
+                for eye in sets.near(lamp[0])
+            },
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,15 +110,13 @@ class StepSearch:
 
         None: at most so many steps weren't found to be enough.
         """
-        seen = self._alone if n_lamps == 1 else self._seen(n_lamps)
-        least, refuted = self._least(n_lamps, most), n_lamps == 1
+        least, refuted = self._least(n_lamps, most), n_lamps <= 2
         for count in range(least, most + 1):
-            for one in seen:
-                found, whole = self._at(one, count, n_eyes)
-                if found is not None:
-                    proof = _SEARCHED if refuted else _SERVED
-                    return replace(found, lower_bound=least, proof=proof), least
-                refuted &= whole
+            found, whole = self._at(n_lamps, count, n_eyes)
+            if found is not None:
+                proof = _SEARCHED if refuted else _SERVED
+                return replace(found, lower_bound=least, proof=proof), least
+            refuted &= whole
             if refuted:
                 least = count + 1
         return None, least
@@ -126,61 +133,84 @@ class StepSearch:
         solution = solve_cover(cover.problem, seed=self.scene.seed, budget=_BUDGET)
         return -(-int(np.ceil(solution.lower_bound - 1e-9)) // n_lamps)
 
-    def _at(self, seen: _Seen, count: int, n_eyes: int) -> tuple[Steps | None, bool]:
-        """The first choice of so many angles that is enough, and whether all were seen.
+    def _at(self, n_lamps: int, count: int, n_eyes: int) -> tuple[Steps | None, bool]:
+        """A choice of so many angles that is enough, and whether all were looked at.
 
-        Those of most that any cameras measure come first.
+        Of each choice of projectors those of most that any cameras measure come first.
         """
-        angles, whole = self._angles(seen, count)
-        for row in angles[:_TRIED]:
+        looked, tried = 0, 0
+        for lamps in self._lamps(n_lamps):
             self.scene.check_cancelled()
-            bits = np.bitwise_or.reduce(seen.measured[:, row], axis=1)
-            for chosen in _together(bits, n_eyes, self.cover.asked[1]):
-                found = self._stands(seen, chosen, row)
-                if found is not None:
-                    return found, whole
-        return None, whole and len(angles) <= _TRIED
+            angles = self._angles(lamps, count)
+            looked += comb(self.sets.lattice.n_places, count)
+            for row in angles:
+                tried += 1
+                near, bits = self._measured(lamps, row)
+                for chosen in _together(bits, n_eyes, self.cover.asked[1]):
+                    eyes = tuple(near[k] for k in chosen)
+                    if (found := self._stands(lamps, eyes, row)) is not None:
+                        return found, True
+                if tried >= _TRIED:
+                    return None, False
+            if looked >= _ALL:
+                return None, False
+        return None, True
 
-    def _angles(self, seen: _Seen, count: int) -> tuple[Ints, bool]:
-        """Sets of angles (m, count) that light enough and where cameras may measure it.
+    def _angles(self, lamps: tuple[Place, ...], count: int) -> Ints:
+        """Sets of angles (m, count) that light enough and where any cameras measure it.
 
-        And whether all sets were looked at.
+        Those where they measure most come first.
         """
         lit, measured = self.cover.asked
-        anyone = np.bitwise_or.reduce(seen.measured, axis=0)
+        light, anyone = (
+            np.bitwise_or.reduce([np.roll(bits, i, axis=0) for bits, i in each])
+            for each in (
+                [(self._circles[e].lit, i) for e, i in lamps],
+                [(self._circles[e].anyone, i) for e, i in lamps],
+            )
+        )
         kept: list[Ints] = []
         held: list[Ints] = []
-        looked = 0
-        for part in _subsets(len(seen.lit), count):
-            looked += len(part)
-            enough = _count(_joined(seen.lit, part)) >= lit
-            part = part[enough]
+        for part in _subsets(len(light), count):
+            part = part[_count(_joined(light, part)) >= lit]
             counts = _count(_joined(anyone, part))
             kept.append(part[counts >= measured])
             held.append(counts[counts >= measured])
-            if looked >= _ALL:
-                break
         order = np.argsort(-np.concatenate(held), kind="stable")
-        return np.concatenate(kept)[order], looked < _ALL
+        return np.concatenate(kept)[order]
+
+    def _measured(
+        self, lamps: tuple[Place, ...], angles: Ints
+    ) -> tuple[list[Place], _Bits]:
+        """Places of cameras, and what each measures at angles with them, (n, b)."""
+        places, n_bytes = self.sets.lattice.n_places, self._circles[0].lit.shape[1]
+        every: dict[Place, _Bits] = {}
+        for e, i in lamps:
+            for (f, k), bits in self._circles[e].measured.items():
+                own = np.bitwise_or.reduce(bits[(angles - i) % places], axis=0)
+                at = f, (k + i) % places
+                every[at] = every[at] | own if at in every else own
+        rows = np.array(list(every.values()), dtype=np.uint8)
+        return list(every), rows.reshape(-1, n_bytes)
 
     def _stands(
-        self, seen: _Seen, chosen: tuple[int, ...], angles: Ints
+        self, lamps: tuple[Place, ...], eyes: tuple[Place, ...], angles: Ints
     ) -> Steps | None:
         """Places in the room, if it holds them and floors of regions are met, too."""
-        lattice, eyes = self.sets.lattice, tuple(seen.near[k] for k in chosen)
+        lattice = self.sets.lattice
         devices: list[tuple[Device, int]] = [
-            *((lattice.projectors[e], i) for e, i in seen.lamps),
+            *((lattice.projectors[e], i) for e, i in lamps),
             *((lattice.cameras[f], k) for f, k in eyes),
         ]
         begins = lattice.begins(devices)
-        cover = replace(self.cover, sets=self.sets.steps_of(seen.lamps, eyes))
+        cover = replace(self.cover, sets=self.sets.steps_of(lamps, eyes))
         if not len(begins) or cover.lacking(angles):
             return None
         # Devices that stand by so much further on see the same at angles as much on.
         from_zero = np.isin(begins, -angles % lattice.n_places)
         by = int(begins[np.argmax(from_zero)])
         return Steps(
-            _moved(seen.lamps, by, lattice.n_places),
+            _moved(lamps, by, lattice.n_places),
             _moved(eyes, by, lattice.n_places),
             np.sort((angles + by) % lattice.n_places),
             1,
@@ -188,47 +218,40 @@ class StepSearch:
         )
 
     @cached_property
-    def _alone(self) -> list[_Seen]:
-        return self._seen(1)
-
-    def _seen(self, n_lamps: int) -> list[_Seen]:
-        return [_seen(self.sets, lamps) for lamps in self._lamps(n_lamps)]
+    def _circles(self) -> list[_Circle]:
+        return [_Circle.of(self.sets, e) for e in range(self._n_circles)]
 
     @cached_property
     def _n_circles(self) -> int:
         return len(self.sets.lattice.projectors)
 
     def _lamps(self, count: int) -> Iterator[tuple[Place, ...]]:
-        """Yield places of projectors: one of each circle, or the best beside it."""
-        alone = [((e, 0),) for e in range(self._n_circles)]
+        """Yield places of projectors, all of one or two of them.
+
+        Of more those that light most, found one after another.
+        """
+        circles, places = range(self._n_circles), self.sets.lattice.n_places
         if count == 1:
-            yield from alone
+            yield from (((e, 0),) for e in circles)
             return
-        order = np.argsort([-self._light(one) for one in alone], kind="stable")
-        places = range(self.sets.lattice.n_places)
-        for k in order[:_BEGINNINGS]:
-            chosen: tuple[Place, ...] = alone[int(k)]
-            while len(chosen) < count:
-                every = product(range(self._n_circles), places)
-                others = [one for one in every if one not in chosen]
-                light = [self._light((*chosen, one)) for one in others]
-                chosen = (*chosen, others[int(np.argmax(light))])
-            yield chosen
+        if count == 2:
+            for e, f in combinations_with_replacement(circles, 2):
+                # On one circle half a turn is as good as the other half.
+                turn = places // 2 + 1 if e == f else places
+                yield from (((e, 0), (f, i)) for i in range(e == f, turn))
+            return
+        chosen: tuple[Place, ...] = ()
+        while len(chosen) < count:
+            every = product(circles, range(places))
+            others = [one for one in every if one not in chosen]
+            light = [self._light((*chosen, one)) for one in others]
+            chosen = (*chosen, others[int(np.argmax(light))])
+        yield chosen
 
     def _light(self, lamps: tuple[Place, ...]) -> float:
         """How much projectors light at all angles together, then on average."""
         lit = self.sets.steps_of(lamps, ()).lit
         return float(lit.any(axis=1).sum()) + float(lit.mean())
-
-
-def _seen(sets: TableSets, lamps: tuple[Place, ...]) -> _Seen:
-    places = sets.lattice.n_places
-    every = ((f, (k + i) % places) for e, i in lamps for f, k in sets.near((e, 0)))
-    near = tuple(dict.fromkeys(every))
-    light = _packed(sets.steps_of(lamps, ()).lit)
-    measured = [_packed(sets.steps_of(lamps, (eye,)).measured) for eye in near]
-    shape = (len(near), *light.shape)
-    return _Seen(lamps, near, light, np.array(measured, np.uint8).reshape(shape))
 
 
 def _packed(rows: NDArray[np.bool_]) -> _Bits:

@@ -43,18 +43,14 @@ def off_axis_m(table: Turntable, space: Workspace) -> float:
 
 
 def about_axis(space: Workspace, table: Turntable) -> Workspace:
-    """Return the workspace as the part sees it, whatever the angle.
-
-    Of the room only the shell is left, and room for the centre's own way about the
-    axis: floor and zones stand still, and are looked at in the room.
-    """
+    """Return the room's workspace with play for the object's own way about the axis."""
     play = off_axis_m(table, space)
 
     def wider(radius: Range) -> Range:
         return max(1e-3, radius[0] - play), radius[1] + play
 
     return replace(
-        space.whole_shell,
+        space,
         projector_radius_m=wider(space.projector_radius_m),
         camera_radius_m=wider(space.camera_radius_m),
     )

@@ -12,6 +12,7 @@ from planning.model.document.station_records import (
 from planning.model.plan import RigPlan
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
+from planning.verify.audit.devices.zone_claims import origin_of
 
 # Poses are written to 0.01 mm, of devices and of what carries them.
 _POSITION_M = 3e-5
@@ -108,6 +109,17 @@ def _audit_steps(plan: RigPlan, told: StationsRecord, findings: AuditFindings) -
         findings.fail("axis", "a turntable needs its axis and a point of it")
         return
     axis, point = np.array(told.axis), np.array(told.point_m)
+    table = plan.document.rig.turntable
+    if table is None:
+        findings.fail("kind", "'turntable' without one in the rig")
+        return
+    there = np.array(table.point_m) + origin_of(plan)
+    for key, claimed, truth in (("axis", axis, table.axis), ("point_m", point, there)):
+        findings.holds(
+            float(np.abs(claimed - np.array(truth)).max()) <= _ROUNDING,
+            key,
+            f"{claimed.tolist()} is claimed, the rig's turntable has {list(truth)}",
+        )
     poses = {d.id: d.world_from_device for d in (*plan.projectors, *plan.cameras)}
     first = told.stations[0]
     for one in told.stations:
