@@ -97,7 +97,7 @@ def _with_fewer(
 ) -> tuple[tuple[PlacedHead, ...], HeadSets, FoundHeads]:
     """Return the fewest of heads, and of others around as long as they save one."""
     while True:
-        found = _fewest_of(source.scene, heads, sets, most)
+        found = _fewest_of(source, heads, sets, most)
         if found.needed <= max(least, 1):
             return heads, sets, found
         moved = _moved_together(source, found, n, found.needed - 1)
@@ -108,18 +108,28 @@ def _with_fewer(
 
 
 def _fewest_of(
-    scene: Scene, heads: tuple[PlacedHead, ...], sets: HeadSets, most: int
+    source: HeadSource, heads: tuple[PlacedHead, ...], sets: HeadSets, most: int
 ) -> FoundHeads:
-    cover = HeadCover.of(scene, sets)
-    solution = solve_cover(cover.problem, seed=scene.seed, budget=_BUDGET)
-    chosen, needed = solution.selected, len(solution.selected)
-    if needed > most:
-        few = solve_max_coverage(cover.problem, most, seed=scene.seed, budget=_BUDGET)
-        chosen = few.selected
-    bound = min(needed, int(np.ceil(solution.lower_bound - 1e-9)))
-    return FoundHeads(
-        heads, cover, chosen, needed, bound, solution.proof, _greedy(cover)
-    )
+    """Return the fewest of some heads whose housings don't collide.
+
+    Of two that do, the one that measures less isn't offered again; the bound is of any.
+    """
+    cover, seed = HeadCover.of(source.scene, sets), source.scene.seed
+    first = solution = solve_cover(cover.problem, seed=seed, budget=_BUDGET)
+    while True:
+        chosen, needed = solution.selected, len(solution.selected)
+        if needed > most:
+            few = solve_max_coverage(cover.problem, most, seed=seed, budget=_BUDGET)
+            chosen = few.selected
+        pair = source.colliding([heads[k] for k in chosen])
+        if pair is None:
+            break
+        measured = sets.measured[:, chosen].sum(axis=0)
+        worse = chosen[min(pair, key=lambda k: (measured[k], k))]
+        cover = cover.without(int(worse))
+        solution = solve_cover(cover.problem, seed=seed, budget=_BUDGET)
+    bound = min(needed, int(np.ceil(first.lower_bound - 1e-9)))
+    return FoundHeads(heads, cover, chosen, needed, bound, first.proof, _greedy(cover))
 
 
 def _moved_together(
@@ -148,7 +158,7 @@ def _moved_together(
             if short[best] < lacking:
                 lacking, heads[k] = int(short[best]), around[best]
                 sets = _with_at(sets, k, offered.take(np.array([best])))
-            if lacking == 0:
+            if lacking == 0 and source.colliding(heads) is None:
                 return tuple(heads)
     return None
 

@@ -126,6 +126,12 @@ class HeadCover:
         quotas = Quotas(sum(floors), numbers, np.array(floors))
         return cls(sets, np.concatenate(rows), np.concatenate(light), quotas)
 
+    def without(self, head: int) -> "HeadCover":
+        """Return the same cover with a head that does nothing; the rows stay."""
+        lit, measured = self.sets.lit.copy(), self.sets.measured.copy()
+        lit[:, head] = measured[:, head] = False
+        return replace(self, sets=replace(self.sets, lit=lit, measured=measured))
+
     @cached_property
     def covers(self) -> Mask:
         """Which row (m, k) each head serves."""

@@ -19,6 +19,8 @@ from planning.scene.workspace.admissible import admissible
 from planning.scene.workspace.candidates import Candidates
 from planning.scene.workspace.shell_positions import Range
 
+from .housings import collision, has_room
+
 _D = TypeVar("_D", PlannedProjector, PlannedCamera)
 
 # Quarter turns about the line of sight: which side of what is looked at the projector
@@ -54,6 +56,7 @@ class HeadSource:
         head: The head.
         workspace: Where the origin of its frame may stand.
         projectors: A projector of each of the rig's models, `cameras` likewise.
+        carried: Whether all poses are of one head.
     """
 
     scene: Scene
@@ -61,6 +64,7 @@ class HeadSource:
     workspace: Workspace
     projectors: tuple[PlannedProjector, ...]
     cameras: tuple[PlannedCamera, ...]
+    carried: bool = False
 
     def over(self, n: int) -> tuple[PlacedHead, ...]:
         """Return about n poses over the workspace.
@@ -94,6 +98,15 @@ class HeadSource:
             ),
         )
 
+    def colliding(self, heads: Sequence[PlacedHead]) -> tuple[int, int] | None:
+        """Return two heads whose housings collide; None: none, or one is carried."""
+        if self.carried:
+            return None
+        clearance = self.scene.requirements.workspace.clearance_m
+        return collision(
+            self.head.body, [head.world_from_head for head in heads], clearance
+        )
+
     @cached_property
     def _view(self) -> PlannedCamera:
         """A camera that sees the head's measuring volume, in its frame."""
@@ -124,7 +137,7 @@ class HeadSource:
         return tuple(head for head in every if self._may_stand(head))
 
     def _may_stand(self, head: PlacedHead) -> bool:
-        """Whether the workspace lets each of its devices stand where it does."""
+        """Whether workspace and object let its devices and its housing stand there."""
         space = self.scene.requirements.workspace
         kinds = (
             (head.projectors, space.projector_radius_m),
@@ -133,7 +146,7 @@ class HeadSource:
         return all(
             admissible(space, radius, _offsets(devices, space)).all()
             for devices, radius in kinds
-        )
+        ) and has_room(self.scene, self.head.body, head.world_from_head)
 
 
 def widened(space: Workspace, head: Head) -> Workspace:

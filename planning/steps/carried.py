@@ -63,6 +63,12 @@ def check_carried(request: PlanRequest) -> None:
         "robust": wishes.robust is not None,
         "[[existing]] devices, or --fixed": bool(rig.table.existing),
         "--ranges": request.ranges is not None,
+        "cross = true with a housing": bool(
+            rig.head and rig.head.cross and rig.head.body
+        ),
+        "cross = true with [stations]": bool(
+            rig.head and rig.head.cross and rig.stations
+        ),
         "[photometry]": rig.table.photometry is not None,
     }
     for asked, there in unable.items():

@@ -38,7 +38,10 @@ def planned_heads(
     ready = prepared(request, clock)
     space = ready.scene.requirements.workspace
     ready = replace(ready, scene=ready.scene.within(widened(space, head)))
-    source = HeadSource(ready.scene, head, space, ready.templates, ready.cameras)
+    source = HeadSource(
+        *(ready.scene, head, space, ready.templates, ready.cameras),
+        carried=request.rig.stations is not None,
+    )
     found, everywhere = _fewest(ready, source, most, clock)
     while True:
         partial = _placed(ready, head, found, everywhere, clock)

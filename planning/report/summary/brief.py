@@ -22,7 +22,7 @@ from .proof_lines import user_selection
 from .region_lines import worst_region
 from .robust_lines import robust_cost
 from .shortfall import Shortfall, missing
-from .station_lines import fewest_words, title_words
+from .station_lines import device_counts, fewest_words, title_words
 from .summary import lost_in_field
 from .warning_lines import warnings
 
@@ -74,9 +74,10 @@ def _block(label: str, text: str, most: int) -> list[str]:
 
 def _head(plan: RigPlan, short: Sequence[Shortfall]) -> Iterator[_Block]:
     document, rig = plan.document, plan.document.rig
+    n_projectors, n_cameras = device_counts(plan)
     devices = (
-        f"{count_words(len(plan.projectors), 'projector')} and "
-        f"{count_words(len(plan.cameras), 'camera')}"
+        f"{count_words(n_projectors, 'projector')} and "
+        f"{count_words(n_cameras, 'camera')}"
     )
     if document.stations is not None:
         devices = f"{title_words(document.stations)} ({devices})"

@@ -41,6 +41,15 @@ def fewest_words(plan: RigPlan) -> str:
     return text
 
 
+def device_counts(plan: RigPlan) -> tuple[int, int]:
+    """Return how many projectors and cameras there are, moved ones counted once."""
+    told = plan.document.stations
+    if told is None or told.kind == "heads" or not told.stations:
+        return len(plan.projectors), len(plan.cameras)
+    one = told.stations[0]
+    return len(one.projectors), len(one.cameras)
+
+
 def station_lines(plan: RigPlan) -> list[str]:
     """Return every station with its devices, and what trades against what."""
     told = plan.document.stations

@@ -1,5 +1,7 @@
 """Claims about heads, stations and steps: who stands where, and how many are needed."""
 
+from itertools import combinations
+
 import numpy as np
 
 from geometry.arrays import Array
@@ -12,7 +14,9 @@ from planning.model.document.station_records import (
 from planning.model.plan import RigPlan
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
+from planning.verify.audit.devices.body_claims import audit_body_zones
 from planning.verify.audit.devices.zone_claims import origin_of
+from planning.verify.audit.predicates.occlusion import Block, Shadow, touches
 
 # Poses are written to 0.01 mm, of devices and of what carries them.
 _POSITION_M = 3e-5
@@ -32,7 +36,7 @@ def audit_stations(case: AuditCase, findings: AuditFindings) -> None:
     if told.kind == "turntable":
         _audit_steps(plan, told, below)
     else:
-        _audit_heads(plan, told, below)
+        _audit_heads(plan, told, case.shadow, below)
     _audit_reference(plan, told, below)
     if told.count is not None:
         _audit_count(told, told.count, below.at("count"))
@@ -59,7 +63,9 @@ def _audit_members(
             )
 
 
-def _audit_heads(plan: RigPlan, told: StationsRecord, findings: AuditFindings) -> None:
+def _audit_heads(
+    plan: RigPlan, told: StationsRecord, shadow: Shadow, findings: AuditFindings
+) -> None:
     """Devices of a head stand as the rig's head says, wherever it stands."""
     head = plan.document.rig.head
     if head is None:
@@ -70,6 +76,7 @@ def _audit_heads(plan: RigPlan, told: StationsRecord, findings: AuditFindings) -
     for one in told.stations:
         members = [poses.get(name) for name in (*one.projectors, *one.cameras)]
         _audit_rigid(head, one, members, findings)
+    _audit_housings(plan, head, told, shadow, findings)
     if told.kind == "stations":
         places = np.array(
             [np.array(s.world_from_station)[:3, 3] for s in told.stations]
@@ -77,6 +84,39 @@ def _audit_heads(plan: RigPlan, told: StationsRecord, findings: AuditFindings) -
         way = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
         slack = 2.0 * len(places) * _POSITION_M
         findings.number("way_m", told.way_m or 0.0, way, slack, "m")
+
+
+def _audit_housings(
+    plan: RigPlan,
+    head: HeadRecord,
+    told: StationsRecord,
+    shadow: Shadow,
+    findings: AuditFindings,
+) -> None:
+    """Housings keep off object, obstacles, zones, and each other where all stand."""
+    body, space = head.body, plan.requirements.workspace
+    if body is None:
+        return
+    blocks: dict[str, Block] = {}
+    for one in told.stations:
+        world = np.array(one.world_from_station)
+        centre = world[:3, :3] @ np.array(body.centre_m) + world[:3, 3]
+        half = np.array(body.half_m)
+        blocks[one.id] = Block(one.id, world[:3, :3], centre, half).shrunk()
+        below = findings.at(f"{one.id}.body")
+        for name, caster in (
+            ("object", shadow.caster),
+            *((f"obstacle {h.name!r}", h.caster) for h in shadow.hindrances),
+        ):
+            below.holds(not touches(blocks[one.id], caster), "", f"touches the {name}")
+        audit_body_zones(blocks[one.id], space, below)
+    pairs = combinations(blocks.items(), 2) if told.kind == "heads" else ()
+    for (name, a), (other, b) in pairs:
+        findings.holds(
+            not a.overlaps(b) and a.gap(b) >= space.clearance_m,
+            f"{name}.body",
+            f"comes nearer to that of {other} than {1e3 * space.clearance_m:g} mm",
+        )
 
 
 def _audit_rigid(
