@@ -148,7 +148,7 @@ def _moved_together(
     for scale in _SCALES:
         for k in range(len(heads)):
             scene.check_cancelled()
-            around = source.around([heads[k]], n, scale)
+            around = source.around(heads[k], n, scale)
             if not around:
                 continue
             offered = HeadSets.of(scene, around, cover.sets.target)

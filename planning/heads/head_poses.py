@@ -32,11 +32,15 @@ _LEAST_M = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class PlacedHead:
-    """A head at a pose, with what it holds."""
+    """A head at a pose, with what it holds.
+
+    It is turned by so many `quarters` about its line of sight, from upright.
+    """
 
     world_from_head: Array
     projectors: tuple[PlannedProjector, ...]
     cameras: tuple[PlannedCamera, ...]
+    quarters: int = 0
 
     def named(self, station: str) -> "PlacedHead":
         """Return the head with its devices at a station of that name."""
@@ -72,15 +76,16 @@ class HeadSource:
         Raises:
             InfeasibleLimitsError: If the workspace holds no position.
         """
-        return self._rolled(self._offer.over(-(-n // _ROLLS)))
+        views = self._offer.over(-(-n // _ROLLS))
+        return tuple(h for k in range(_ROLLS) for h in self._turned(views, k))
 
     def around(
-        self, chosen: Sequence[PlacedHead], n: int, scale: float = 1.0
+        self, head: PlacedHead, n: int, scale: float = 1.0
     ) -> tuple[PlacedHead, ...]:
-        """Return poses close around those chosen of a lattice of n, far ones too."""
-        poses = (head.world_from_head for head in chosen)
-        views = [replace(self._view, world_from_device=pose) for pose in poses]
-        return self._rolled(self._offer.around(views, n // _ROLLS, scale, far=True))
+        """Return poses close around one of a lattice of n, turned as it is."""
+        view = replace(self._view, world_from_device=head.world_from_head)
+        views = self._offer.around([view], n // _ROLLS, scale, far=True)
+        return self._turned(views, head.quarters)
 
     def at(self, world_from_head: Array) -> PlacedHead:
         """Return the head at a pose."""
@@ -124,17 +129,18 @@ class HeadSource:
         (offer,) = self.scene.candidates([self._view], self.workspace).of_models
         return offer
 
-    def _rolled(self, views: Sequence[PlannedCamera]) -> tuple[PlacedHead, ...]:
-        """The head at each pose, turned to all four sides."""
-        poses: list[Array] = []
-        for k in range(_ROLLS):
-            turn, angle = np.eye(4), 2.0 * np.pi * k / _ROLLS
-            turn[:2, :2] = np.round(
-                [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
-            )
-            poses += [view.world_from_device @ turn for view in views]
-        every = (self.at(pose) for pose in poses)
-        return tuple(head for head in every if self._may_stand(head))
+    def _turned(
+        self, views: Sequence[PlannedCamera], quarters: int
+    ) -> tuple[PlacedHead, ...]:
+        """The head at poses, turned by so many quarters about the line of sight."""
+        turn, angle = np.eye(4), 2.0 * np.pi * quarters / _ROLLS
+        turn[:2, :2] = np.round(
+            [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+        )
+        every = (self.at(view.world_from_device @ turn) for view in views)
+        return tuple(
+            replace(head, quarters=quarters) for head in every if self._may_stand(head)
+        )
 
     def _may_stand(self, head: PlacedHead) -> bool:
         """Whether workspace and object let its devices and its housing stand there."""

@@ -7,13 +7,15 @@ import numpy as np
 
 from planning.cameras.camera_cover import CameraCover, candidate_cover
 from planning.cameras.proved_cameras import CameraStage
+from planning.model.document.certificates import NeededCount
 from planning.model.planned import PlannedProjector
 from planning.projectors.candidate_set import CandidateSet
 from planning.projectors.projector_stage import ProjectorStage
-from planning.projectors.proved_projectors import prove_fewest
-from planning.proofs.all_poses import Effort
+from planning.proofs.all_poses import BoundQuestion, Effort
 from planning.proofs.candidate_certificate import unproved, unsought
-from planning.proofs.selection import select_fewest
+from planning.proofs.projector_bound import bound_projectors
+from planning.proofs.quotas import RegionFloors
+from planning.proofs.selection import fewest_count
 from planning.scene.camera_views import CandidateViews
 from planning.scene.draws import DRAWS
 from planning.scene.lighting import lit_stages
@@ -72,16 +74,30 @@ def least_by_light(
     heads: Sequence[PlacedHead],
     templates: tuple[PlannedProjector, ...],
     effort: Effort,
-) -> int | None:
+) -> int:
     """Return how many heads it takes at least, wherever they stand.
 
     As many projectors as light enough anywhere in the workspace, shared out among
-    heads: what a head measures it lights. None: the bound wasn't looked for.
+    heads.
     """
-    target = scene.target_samples(DRAWS.projectors)
     projectors = tuple(p for head in heads for p in head.projectors)
+    target = scene.target_samples(DRAWS.projectors)
+    target = target.take(
+        np.arange(min(len(target), effort.most_samples or len(target)))
+    )
     candidates = CandidateSet.over(scene, target, projectors)
-    stage = ProjectorStage.over(candidates, select_fewest(candidates.cover))
-    bound = prove_fewest(scene, stage, templates, effort).certificate.continuous
-    each = len(heads[0].projectors)
-    return None if bound is None else -(-bound.lower_bound // each)
+    count, area = fewest_count(candidates.cover), target.samples.weight * len(target)
+    proof = unproved(candidates.cover, target.samples.weight)
+    proof = proof.changed(given=0, needed=NeededCount(count=count, lower_bound=0))
+    reached = candidates.reached
+    question = BoundQuestion.about(
+        proof,
+        reached,
+        np.zeros(len(target), dtype=bool),
+        scene.requirements.dominant_coverage,
+        area,
+        RegionFloors.of(scene, target),
+    )
+    wanted = target.take(np.flatnonzero(reached))
+    bound = bound_projectors(scene, templates, wanted, question, effort).proof()
+    return -(-bound.lower_bound // len(heads[0].projectors))
