@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from geometry.mesh.sampling import SurfaceSamples
-from planning.heads.fewest_heads import _greedy, _lacking_with_each
-from planning.heads.head_cover import HeadCover, HeadSets
+from planning.cameras.stations.heads.fewest_heads import _greedy, _lacking_with_each
+from planning.cameras.stations.heads.head_cover import HeadCover, HeadSets
 from planning.scene.samples import Target
 from solvers import solve_cover
 

@@ -5,8 +5,8 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from planning.heads import tour
-from planning.heads.tour import shortest_way
+from planning.cameras.stations.heads import tour
+from planning.cameras.stations.heads.tour import shortest_way
 
 
 def _length(places, order):

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from geometry.mesh.sampling import SurfaceSamples
-from planning.heads.head_cover import HeadCover
+from planning.cameras.stations.heads.head_cover import HeadCover
+from planning.cameras.stations.turntable.fewest_steps import StepSearch, _together
+from planning.cameras.stations.turntable.table_sets import TableSets
 from planning.scene.samples import Target
-from planning.turntable.fewest_steps import StepSearch, _together
-from planning.turntable.table_sets import TableSets
 
 ANGLES, CIRCLES, N = 6, 2, 40
 

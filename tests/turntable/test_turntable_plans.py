@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from support.group_rigs import egg, planned, table_rig
 
-from planning.heads.head_cover import HeadSets
-from planning.heads.head_poses import PlacedHead
+from planning.cameras.stations.heads.head_cover import HeadSets
+from planning.cameras.stations.heads.head_poses import PlacedHead
+from planning.cameras.stations.turntable import table_lattice
+from planning.cameras.stations.turntable.table_lattice import TableLattice, about_axis
+from planning.cameras.stations.turntable.table_sets import TableSets
 from planning.model.device_poses import moved_to
 from planning.model.errors import InfeasibleLimitsError, InputError
 from planning.scene.draws import DRAWS
 from planning.steps.prepare import prepared
-from planning.turntable import table_lattice
-from planning.turntable.table_lattice import TableLattice, about_axis
-from planning.turntable.table_sets import TableSets
 from planning.verify.audit.audit import audit_plan
 
 _WALL = {
