@@ -17,8 +17,8 @@ from .joint_problem import JointProblem
 
 _Index = NDArray[np.int64]
 _NONE = np.zeros(0, dtype=np.int64)
-# Counted work of one cover, and wall time that no cover of that much work takes.
-_WORK, _LONG = 3e8, 3600.0
+# Wall time that no cover of counted work takes [s].
+_LONG = 3600.0
 # Sums of costs that are told apart; more are taken together.
 _MOST_SUMS = 64
 # Sums of the same costs in another order.
@@ -41,10 +41,13 @@ class Taken:
 
 
 class CoverCosts:
-    """Solves covers of a joint problem, at most so many of them."""
+    """Solves covers of a joint problem, at most so many, with counted work for each."""
 
-    def __init__(self, problem: JointProblem, n_covers: int, seed: int) -> None:
-        self.problem, self.left, self._seed = problem, n_covers, seed
+    def __init__(
+        self, problem: JointProblem, n_covers: int, budget: float, seed: int
+    ) -> None:
+        self.problem, self.left = problem, n_covers
+        self._budget, self._seed = budget, seed
         self._known: dict[frozenset[int], Taken] = {}
 
     @property
@@ -79,7 +82,7 @@ class CoverCosts:
             max_sets=most,
             time_limit=_LONG,
             seed=self._seed,
-            budget=_WORK,
+            budget=self._budget,
             heaviest=False,
         )
         if found.status is SolveStatus.INFEASIBLE:

@@ -33,7 +33,7 @@ from .joint_problem import JointProblem
 
 _Index = NDArray[np.int64]
 _NONE = np.zeros(0, dtype=np.int64)
-DEFAULT_COVERS = 800
+DEFAULT_COVERS, DEFAULT_BUDGET = 800, 3e8
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +73,7 @@ def solve_joint(
     known: tuple[ArrayLike, ArrayLike] | None = None,
     seed: int = 0,
     n_covers: int = DEFAULT_COVERS,
+    budget: float = DEFAULT_BUDGET,
 ) -> JointSolution:
     """Find the cheapest projectors and cameras that light and measure enough.
 
@@ -80,7 +81,8 @@ def solve_joint(
         problem: The joint cover.
         known: Projectors and cameras to begin with; the answer is never dearer.
         seed: Seed of the covers' heuristics.
-        n_covers: Covers that are solved at most, about as many; each of counted work.
+        n_covers: Covers of one kind that are solved, about as many at most.
+        budget: Counted work of each, in matrix entries touched.
 
     Returns:
         The solution; an infeasible problem is an answer, not an error.
@@ -89,7 +91,7 @@ def solve_joint(
         ValueError: If known devices aren't of the problem, or aren't enough.
     """
     n_covers = whole_number("n_covers", n_covers, least=1)
-    search = _Search(problem, CoverCosts(problem, n_covers, seed))
+    search = _Search(problem, CoverCosts(problem, n_covers, budget, seed))
     if known is not None:
         p = set_names("known projectors", known[0], problem.n_projectors)
         c = set_names("known cameras", known[1], problem.n_cameras)
@@ -118,6 +120,10 @@ class _Search:
     covers: CoverCosts
     best: tuple[_Index, _Index] | None = None
     cost: float = np.inf
+    light: float = 0.0
+    able: list[tuple[_Index, float]] = field(
+        default_factory=list[tuple[_Index, float]]
+    )
     cuts: list[tuple[frozenset[int], float]] = field(
         default_factory=list[tuple[frozenset[int], float]]
     )
@@ -128,6 +134,7 @@ class _Search:
         light = self.covers.lighting([])
         if not (np.isfinite(with_all.bound) and np.isfinite(light.bound)):
             return self._ended(np.inf)
+        self.light = light.bound
         if with_all.chosen is not None:
             self._improve(with_all.chosen)
         below = self.cost if np.isfinite(self.cost) else self._dearest()
@@ -188,7 +195,9 @@ class _Search:
     def _improve(self, cameras: _Index) -> None:
         """Take the cheapest projectors for cameras, and cameras for these, in turn."""
         while not self.covers.exhausted:
-            before = self.cost
+            before, dear = self.cost, self.problem.cost(_NONE, cameras)
+            if not self._saves(dear + self.light):
+                return
             light = self.covers.projectors(cameras)
             if light.chosen is None:
                 return
@@ -207,27 +216,41 @@ class _Search:
         Others join halves at a time, those first with which least more is measured.
         """
         kept, bound = chosen, self.covers.cameras(chosen).bound
-        left = [self._by_gain(chosen)]
+        left, able = [self._by_gain(chosen)], None
         while left and not self.covers.exhausted:
             some = left.pop()
-            grown = self.covers.cameras(kept | frozenset(some))
+            trial = kept | frozenset(some)
+            if self._does(trial, high):
+                left += _halves(some)
+                continue
+            grown = self.covers.cameras(trial)
             if grown.bound > high:
-                kept, bound = kept | frozenset(some), grown.bound
+                kept, bound = trial, grown.bound
                 continue
             if grown.chosen is not None and grown.cost <= high:
-                light = self.covers.projectors(grown.chosen)
-                if light.chosen is not None:
-                    self.offer(light.chosen, grown.chosen)
-            if len(some) > 1:
-                left += [some[len(some) // 2 :], some[: len(some) // 2]]
+                able = grown.chosen
+                self.able.append((able, grown.cost))
+            left += _halves(some)
         self.cuts.append((kept, bound))
+        if able is not None:
+            self._improve(able)
+
+    def _does(self, projectors: frozenset[int], high: float) -> bool:
+        """Whether cameras seen before, for no more, are enough with projectors."""
+        problem, rows = self.problem, self.problem.rows_with(sorted(projectors))
+        return any(
+            cost <= high
+            and problem.required_measured.met(
+                problem.measured_by_rows(rows[cameras]), problem.row_sets
+            )
+            for cameras, cost in reversed(self.able)
+        )
 
     def _by_gain(self, chosen: frozenset[int]) -> list[int]:
         """Other projectors, by how many pairs of sample and camera they add."""
-        pairs = self.problem.pairs
-        present = np.any(pairs[:, :, sorted(chosen)], axis=2)
+        present = ~self.problem.measured_with(sorted(chosen))
         others = [p for p in range(self.problem.n_projectors) if p not in chosen]
-        gains = [int((pairs[:, :, p] & ~present).sum()) for p in others]
+        gains = [int((self.problem.measured_with([p]) & present).sum()) for p in others]
         return [others[i] for i in np.argsort(gains, kind="stable")]
 
     def _ended(self, bound: float) -> JointSolution:
@@ -251,6 +274,12 @@ class _Search:
         if not self.cuts:
             return "fewest projectors beside fewest cameras of any projectors"
         return f"hitting sets of {len(self.cuts)} sets of projectors"
+
+
+def _halves(some: list[int]) -> list[list[int]]:
+    """Return two halves, the first one last; none of a single one."""
+    middle = len(some) // 2
+    return [some[middle:], some[:middle]] if middle else []
 
 
 def _step(cost: float) -> float:

@@ -15,10 +15,12 @@ projectors; a camera's sets grow with every projector that is taken.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from solvers.bit_rows import pack_rows, unpack_rows
 from solvers.checked_numbers import real_numbers, set_names, whole_numbers
 from solvers.covers.cover_problem import CoverProblem
 
@@ -136,7 +138,12 @@ class JointProblem:
         """Return which samples pairs of chosen devices measure, shape (n_e,)."""
         p = set_names("projectors", projectors, self.n_projectors)
         c = set_names("cameras", cameras, self.n_cameras)
-        return np.any(self.pairs[:, c][:, :, p], axis=(1, 2))
+        return self.measured_by_rows(self._bits[np.ix_(p, c)].reshape(p.size * c.size, -1))
+
+    def measured_by_rows(self, rows: NDArray[np.uint64]) -> _Mask:
+        """Return which samples any of some bit rows holds, shape (n_e,)."""
+        bits = np.bitwise_or.reduce(rows, axis=0)
+        return unpack_rows(bits[None], len(self.lit))[0]
 
     def enough(self, projectors: ArrayLike, cameras: ArrayLike) -> bool:
         """Return whether devices light and measure enough, and are no more than may."""
@@ -154,10 +161,25 @@ class JointProblem:
         c = set_names("cameras", cameras, self.n_cameras)
         return float(self.projector_costs[p].sum() + self.camera_costs[c].sum())
 
+    @cached_property
+    def _bits(self) -> NDArray[np.uint64]:
+        """Bit rows of what each pair measures, (n_p, n_c, n_words)."""
+        n_e, n_c, n_p = self.pairs.shape
+        rows = np.ascontiguousarray(self.pairs.T).reshape(n_p * n_c, n_e)
+        return pack_rows(rows).reshape(n_p, n_c, -1)
+
+    def rows_with(self, projectors: ArrayLike) -> NDArray[np.uint64]:
+        """Return bit rows of what each camera measures with any of them, (n_c, w)."""
+        chosen = set_names("projectors", projectors, self.n_projectors)
+        return np.bitwise_or.reduce(self._bits[chosen], axis=0)
+
+    def measured_with(self, projectors: ArrayLike) -> _Mask:
+        """Return which camera measures which sample with any of them, (n_e, n_c)."""
+        return unpack_rows(self.rows_with(projectors), len(self.lit)).T
+
     def camera_cover(self, projectors: ArrayLike) -> CoverProblem:
         """State the cover by cameras that is left with these projectors."""
-        chosen = set_names("projectors", projectors, self.n_projectors)
-        covers = np.any(self.pairs[:, :, chosen], axis=2)
+        covers = self.measured_with(projectors)
         required = self.required_measured
         if not required.floors.any():
             total = np.array([float(required.total)])
