@@ -28,6 +28,7 @@ from planning.scene.ranges.ranged_body import RangedBody
 from planning.verify.verification import Verification, verify_plan
 
 from .steps.checked import with_check
+from .steps.joint.joining import jointly
 from .steps.prepare import prepared, request_of, standing_devices
 from .steps.stages import (
     bounded_cameras,
@@ -71,6 +72,7 @@ def plan_rig(
     robust: float | None = None,
     views: int | None = None,
     survive: int = 0,
+    joint: bool = False,
     pattern: Pattern = "rings",
     seed: int = 0,
     threads: int | None = None,
@@ -117,6 +119,8 @@ def plan_rig(
             counts as covered; None: one.
         survive: Devices, 0 or 1, of which any may be lost: what is left still meets
             the requirements.
+        joint: Whether projectors and cameras are then sought together, the cheapest,
+            and moved together (`docs/method/joint.md`).
         pattern: What projectors show: `rings`, or a `dense` code of every pixel.
         seed: The same seed gives the same plan.
         threads: Worker threads; no result depends on it. None: one for each core.
@@ -163,6 +167,7 @@ def plan_rig(
         robust=robust,
         views=views,
         survive=survive,
+        joint=joint,
         pattern=pattern,
     )
     # BLAS must not split sums differently with another number of threads.
@@ -182,7 +187,7 @@ def plan_rig(
             evaluates=evaluates,
         )
         check_survival(request)
-        planned = _evaluated if evaluates else robustly(_planned)
+        planned = jointly(_evaluated if evaluates else robustly(_planned))
         plan, partial = planned(request, clock, keep)
         if check and not plan.document.truncated:
             plan = _checked(plan, partial, clock, keep, checked)

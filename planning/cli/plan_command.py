@@ -40,6 +40,7 @@ _ASKED = (
     "robust",
     "views",
     "survive",
+    "joint",
     "pattern",
     "seed",
     "prove",

@@ -27,6 +27,7 @@ from .input_records import (
     SurfaceRecord,
     Units,
 )
+from .joint_records import JointRecord
 from .part import Part
 from .ring_records import RingAxes
 from .survival_records import SurvivalRecord
@@ -99,6 +100,7 @@ class PlanDocument(Part):
     evaluation: EvaluationRecord | None = None
     robust: RobustRecord | None = None
     survival: SurvivalRecord | None = None
+    joint: JointRecord | None = None
     camera_groups: tuple[tuple[str, ...], ...] = ()
     cost: CostRecord
     members: tuple[MemberRecord, ...]

@@ -6,11 +6,11 @@ Of a pair of projector and camera on a sample, the least of::
     (tangent angle - min) / (90 deg - min)    of the light, where T1 is known
     1 - min_conditioning / |r.m|
     1 - sigma / max_sigma
-    1 - min_ring_pitch / pitch                where rings have one
     (least distance to either limit) / (half of what lies between)    of an angle
 
 where a limit is set. 0 is at a limit, 1 as far from it as can be. Field, range and
-shadows are met or not and have no share. A sample's slack is that of its best pair.
+shadows are met or not and have no share; the pitch of rings is set to its limit on
+purpose (`rings.ring_stage`). A sample's slack is that of its best pair.
 """
 
 import numpy as np
@@ -48,8 +48,6 @@ def pair_slack(
     slack = np.minimum(slack, 1.0 - limits.min_conditioning / conditioning)
     if (most := limits.max_sigma_m) is not None:
         slack = np.minimum(slack, 1.0 - quality.sigma / most)
-    if (least := limits.min_ring_pitch_px) is not None:
-        slack = np.minimum(slack, 1.0 - least / np.maximum(quality.pitch, 1e-12))
     if quality.light_cos is not None:
         low, high = limits.angles
         angle = np.arccos(np.clip(quality.light_cos, -1.0, 1.0))

@@ -1,7 +1,7 @@
 """What devices on offer light, and how well their pairs measure, on the same samples."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.scene.camera_views import CameraView, camera_views
-from planning.scene.lighting import light_on, lit_stages
+from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.measured import LitSamples, pairs_of
 from planning.scene.samples import Target
@@ -18,6 +18,7 @@ from planning.scene.scene import Scene
 from .slack import light_slack, pair_slack
 
 _Mask = NDArray[np.bool_]
+_Slack = NDArray[np.float32]
 # Seen by several cameras and worked on together.
 _PAIRS = 8192
 
@@ -58,21 +59,17 @@ class JointTables:
         slack = _slack(scene, samples, views)
         return cls(scene, target, tuple(projectors), tuple(cameras), lit, slack)
 
+    def best(self, projectors: Sequence[int], cameras: Sequence[int]) -> _Slack:
+        """Return the slack of each sample by its best pair, -inf for none, (n,)."""
+        if not (len(projectors) and len(cameras)):
+            return np.full(len(self.lit), -np.inf, dtype=np.float32)
+        some = self.slack[:, list(cameras)][:, :, list(projectors)]
+        return some.max(axis=(1, 2))
+
     @property
     def pairs(self) -> _Mask:
         """Which pair measures which sample, shape (n, n_c, n_p)."""
         return np.isfinite(self.slack)
-
-    def with_samples(self, other: "JointTables") -> "JointTables":
-        """Return the same devices on the samples of both."""
-        from planning.scene.samples import merged
-
-        return replace(
-            self,
-            target=merged(self.target, other.target),
-            lit=np.concatenate([self.lit, other.lit]),
-            slack=np.concatenate([self.slack, other.slack]),
-        )
 
 
 def _slack(
@@ -98,17 +95,4 @@ def _slack(
             good = pair.measured
             rows, columns = pair.samples[good], column[pair.places[good]]
             slack[rows, columns, pair.projector] = found[good]
-    return slack
-
-
-def lights_of(
-    scene: Scene, projectors: Sequence[PlannedProjector], target: Target
-) -> NDArray[np.float64]:
-    """Return the slack of each projector's light on samples, (n, n_p); -inf unlit."""
-    lit = lit_stages(scene, projectors, target) == LIT
-    slack = np.full(lit.shape, -np.inf)
-    for p, projector in enumerate(projectors):
-        some = np.flatnonzero(lit[:, p])
-        light = light_on(projector, target.take(some))
-        slack[some, p] = light_slack(light, scene.requirements.projector)
     return slack

@@ -1,0 +1,157 @@
+"""Turns devices that were chosen together into a plan with rings, proofs and claims."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planning.cameras.axis_choice import place_for_axes
+from planning.cameras.camera_cover import NothingMeasuredError, plan_cameras
+from planning.cameras.kept_pairs import rings_for_pairs
+from planning.cameras.proved_cameras import CameraStage, camera_stage
+from planning.model.document.input_records import RigRecord
+from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.projectors.candidate_set import CandidateSet
+from planning.projectors.exposures import with_exposures
+from planning.projectors.projector_stage import ProjectorStage
+from planning.proofs.candidate_certificate import counted
+from planning.proofs.selection import select_fewest
+from planning.report.partial_plan import PartialPlan
+
+Projectors = tuple[PlannedProjector, ...]
+Cameras = tuple[PlannedCamera, ...]
+
+
+@dataclass(frozen=True)
+class Costs:
+    """What devices cost, by the rig."""
+
+    rig: RigRecord
+
+    def projectors(self, devices: Projectors) -> float:
+        """Return the cost of projectors."""
+        return sum(self.rig.cost_of("projector", one.model) for one in devices)
+
+    def cameras(self, devices: Cameras) -> float:
+        """Return the cost of cameras."""
+        return sum(self.rig.cost_of("camera", one.model) for one in devices)
+
+    def both(self, projectors: Projectors, cameras: Cameras) -> float:
+        """Return the cost of devices of both kinds."""
+        return self.projectors(projectors) + self.cameras(cameras)
+
+
+def with_cheapest_cameras(
+    partial: PartialPlan, projectors: Projectors, cameras: Cameras, costs: Costs
+) -> PartialPlan | None:
+    """Return the plan with other projectors, and the cheaper of two sets of cameras.
+
+    These are the cameras given, or the fewest of all candidates for the projectors,
+    confirmed by fresh samples. None where nothing is measured.
+    """
+    request = partial.request
+    stage = projector_stage(partial, projectors)
+    projectors = with_exposures(partial.scene, projectors)
+    try:
+        solution = place_for_axes(
+            partial.scene.among(projectors),
+            projectors,
+            partial.camera_stage.cover.candidates,
+            "cover",
+            axis=partial.axes,
+            margin=request.ring_margin,
+        )
+    except NothingMeasuredError:
+        return None
+    fewest = solution.stage
+    met = fewest.certificate.status != "infeasible"
+    if not (met and costs.cameras(fewest.cameras) <= costs.cameras(cameras)):
+        return with_devices(partial, projectors, cameras)
+    return PartialPlan(
+        partial.ready,
+        stage,
+        solution.projectors,
+        fewest,
+        fewest.cameras,
+        axes=solution.axes,
+    )
+
+
+def with_devices(
+    partial: PartialPlan, projectors: Projectors, cameras: Cameras
+) -> PartialPlan | None:
+    """Return the plan with other devices as they stand, with rings for them.
+
+    What is proved is proved again for these projectors. None where nothing is measured.
+    """
+    request = partial.request
+    stage = projector_stage(partial, projectors)
+    projectors = with_exposures(partial.scene, projectors)
+    views = cameras_proved(partial, projectors, cameras)
+    if views is None:
+        return None
+    rings = None
+    if request.ring_axis is not None:
+        rings = rings_for_pairs(
+            partial.scene.among((*projectors, *cameras)),
+            projectors,
+            cameras,
+            request.rig.rings.spacing,
+            views.cover.samples,
+            margin=request.ring_margin,
+        )
+    return PartialPlan(
+        partial.ready,
+        stage,
+        projectors,
+        views,
+        cameras,
+        axes=partial.axes,
+        rings=rings,
+    )
+
+
+def projector_stage(partial: PartialPlan, projectors: Projectors) -> ProjectorStage:
+    """Return the stage of other projectors, with what is proved of their number.
+
+    Of fewer than the fewest candidates: then they join these.
+    """
+    stage = partial.stage
+    candidates = stage.candidates
+    weight = candidates.samples.samples.weight
+    if len(projectors) >= stage.certificate.needed.lower_bound:
+        area = float(candidates.reached.sum()) * weight
+        return counted(
+            replace(stage, projectors=projectors), projectors, area
+        )
+    first = len(candidates.projectors)
+    candidates = candidates.joined(
+        CandidateSet.over(candidates.scene, candidates.samples, projectors)
+    )
+    known = first + np.arange(len(projectors))
+    selection = select_fewest(candidates.cover, known=known)
+    stage = ProjectorStage.over(candidates, selection)
+    area = float(candidates.reached.sum()) * weight
+    return counted(replace(stage, projectors=projectors), projectors, area)
+
+
+def cameras_proved(
+    partial: PartialPlan, projectors: Projectors, cameras: Cameras
+) -> CameraStage | None:
+    """Return the stage of cameras as they stand, with what is proved of their number.
+
+    Where they are fewer than any candidates for these projectors, they join these.
+    """
+    scene = partial.scene.among(projectors)
+    views = partial.camera_stage.cover.candidates
+    try:
+        cover = plan_cameras(scene, projectors, views)
+        if len(cameras) < cover.selection.needed:
+            first = len(views.cameras)
+            views = views.joined(cameras)
+            known = first + np.arange(len(cameras))
+            cover = plan_cameras(scene, projectors, views, known)
+    except NothingMeasuredError:
+        return None
+    stage = camera_stage(scene, cover)
+    area = cover.measured.any(axis=1).sum() * cover.samples.target.samples.weight
+    return counted(replace(stage, cameras=cameras), cameras, float(area))
