@@ -13,10 +13,10 @@ from solvers.covers.cover import solve_cover
 from solvers.covers.cover_problem import CoverProblem
 from solvers.status import SolveStatus
 
+from .few_sets import MOST_SETS, cheapest_of_all
 from .joint_problem import JointProblem
 
 _Index = NDArray[np.int64]
-_NONE = np.zeros(0, dtype=np.int64)
 # Wall time that no cover of counted work takes [s].
 _LONG = 3600.0
 # Sums of costs that are told apart; more are taken together.
@@ -74,9 +74,12 @@ class CoverCosts:
 
     def _solved(self, problem: CoverProblem, most: int | None) -> Taken:
         self.left -= 1
-        if most == 0:
-            met = problem.weights.size == 0 or not problem.required_weight.any()
-            return Taken(_NONE, 0.0, 0.0) if met else Taken(None, np.inf, np.inf)
+        if problem.costs.size <= MOST_SETS:
+            few = cheapest_of_all(problem, most)
+            if few is None:
+                return Taken(None, np.inf, np.inf)
+            cost = float(problem.costs[few].sum())
+            return Taken(few, cost, cost)
         found = solve_cover(
             problem,
             max_sets=most,

@@ -108,6 +108,8 @@ class JointProblem:
             row_sets = whole_numbers("row_sets", self.row_sets)
         if row_sets.shape != (n_e,) or not np.all(row_sets >= 0):
             raise ValueError(f"row_sets must be ({n_e},), at least 0")
+        if not all(most is None or most >= 1 for most in self.most):
+            raise ValueError(f"at least one of each kind is allowed, got {self.most}")
         for required in (self.required_lit, self.required_measured):
             _check_there(required, row_sets)
         values = {

@@ -35,8 +35,9 @@ from .tables import JointTables
 Keep = Callable[[RigPlan], None]
 Planned = Callable[[PlanRequest, Stopwatch, Keep | None], tuple[RigPlan, PartialPlan]]
 Found = Literal["two stages", "candidates", "poses"]
-# Covers that the joint program may solve, and times that a device is left out.
-_COVERS, _FEWER = 400, 3
+# Covers that the joint program may solve, counted work of each, and times that a
+# device is left out.
+_COVERS, _WORK, _FEWER = 300, 4e7, 3
 # Slack that is worth other poses.
 _GAIN = 5e-3
 
@@ -145,6 +146,7 @@ class _Joint:
                 known=offer.own,
                 seed=self.request.seed,
                 n_covers=_COVERS,
+                budget=_WORK,
             )
             self.clock.say(
                 f"  cost {solution.cost:g} for {self.two_stage.cost:g} of two stages; "
