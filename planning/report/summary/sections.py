@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from planning.model.plan import RigPlan
+from planning.report.tolerance.joint_lines import joint_lines
 from planning.report.tolerance.survival_lines import survival_lines
 
 from .check_lines import check_lines, cost_lines
@@ -63,7 +64,7 @@ SECTIONS = (
     Section(
         "proofs",
         "what was proved of the numbers of devices, and over which poses.",
-        proof_lines,
+        lambda plan: [*proof_lines(plan), *joint_lines(plan)],
     ),
     Section(
         "marginal",
