@@ -43,17 +43,16 @@ def saved_words(plan: RigPlan, record: JointRecord) -> str:
 
 def bound_words(plan: RigPlan, record: JointRecord) -> str:
     """Return what is proved of both numbers together, and over what."""
-    over = record.over
-    what = "cost" if _costed(plan) else "devices"
+    over, unit = record.over, "in cost" if _costed(plan) else "devices"
     scope = (
         f"of {over.projectors} projectors and {over.cameras} cameras on offer, for "
         f"{over.samples} samples"
     )
     if record.status == "optimal":
-        return f"proved: {what} of {record.needed:g} are the least {scope}"
+        return f"{record.needed:g} {unit} are proved the least {scope}"
     return (
-        f"at least {what} of {record.lower_bound:g} are needed, {record.needed:g} "
-        f"suffice {scope}"
+        f"at least {record.lower_bound:g} {unit} are needed, {record.needed:g} suffice "
+        f"{scope}"
     )
 
 

@@ -40,13 +40,17 @@ class Costs:
         return self.projectors(projectors) + self.cameras(cameras)
 
 
-def with_cheapest_cameras(
-    partial: PartialPlan, projectors: Projectors, cameras: Cameras, costs: Costs
+def with_cameras_for(
+    partial: PartialPlan,
+    projectors: Projectors,
+    cameras: Cameras,
+    costs: Costs,
+    below: float,
 ) -> PartialPlan | None:
-    """Return the plan with other projectors, and the cheaper of two sets of cameras.
+    """Return the plan with other projectors, and cameras for them.
 
-    These are the cameras given, or the fewest of all candidates for the projectors,
-    confirmed by fresh samples. None where nothing is measured.
+    These are the fewest of all candidates, which fresh samples confirm, if with them
+    all costs less than `below`; else the cameras given. None where nothing is measured.
     """
     request = partial.request
     stage = projector_stage(partial, projectors)
@@ -64,7 +68,7 @@ def with_cheapest_cameras(
         return None
     fewest = solution.stage
     met = fewest.certificate.status != "infeasible"
-    if not (met and costs.cameras(fewest.cameras) <= costs.cameras(cameras)):
+    if not (met and costs.both(projectors, fewest.cameras) < below):
         return with_devices(partial, projectors, cameras)
     return PartialPlan(
         partial.ready,

@@ -21,8 +21,9 @@ from .tables import JointTables
 _Slack = NDArray[np.float32]
 # What is lacking, then minus the slack.
 Score = tuple[int, float]
-# A gain of slack that is worth an exchange; pairs looked at in full.
-_GAIN, _PAIRS = 2e-3, 8
+# A gain of slack that is worth an exchange; pairs that are taken out, and of each those
+# that are looked at in full in their place.
+_GAIN, _TRIED, _PAIRS = 2e-3, 9, 8
 
 
 @dataclass(eq=False)
@@ -94,9 +95,10 @@ class Exchange:
     def _two(self) -> bool:
         """Take the best exchange of a projector and a camera; whether there is any."""
         found: tuple[Score, list[int], list[int]] | None = None
-        for (lights, p), (views, c) in product(
-            _without_each(self.projectors), _without_each(self.cameras)
-        ):
+        places = product(_without_each(self.projectors), _without_each(self.cameras))
+        # Those without which least is lost go first.
+        order = sorted(places, key=lambda two: self._of(two[0][0], two[1][0]))
+        for (lights, p), (views, c) in order[:_TRIED]:
             for q, d in self._promising(lights, p, views, c):
                 score = self._of([*lights, q], [*views, d])
                 if found is None or score < found[0]:

@@ -23,10 +23,10 @@ from planning.report.assemble import write_plan
 from planning.report.partial_plan import PartialPlan, PlanRequest
 from planning.report.summary.shortfall import shortfalls
 from planning.scene.draws import DRAWS
-from planning.steps.stages import bounded_cameras, polished
+from planning.steps.stages import bounded_cameras, one_device_more, polished
 from solvers.joint.joint_cover import JointSolution, solve_joint
 
-from .completed import Costs, with_cheapest_cameras, with_devices
+from .completed import Costs, with_cameras_for, with_devices
 from .moves import one_device_fewer, wider_slack
 from .offer import JointOffer, devices_of, joint_offer
 from .slack import slack_at_share
@@ -164,14 +164,20 @@ class _Joint:
 
     def _by_candidates(self, offer: JointOffer, solution: JointSolution) -> None:
         """Complete the program's answer, if it is cheaper than the two stages'."""
-        if not solution.cost < self.two_stage.cost * (1.0 - 1e-9):
+        below = self.two_stage.cost * (1.0 - 1e-9)
+        if not solution.cost < below:
             return
         devices = devices_of(
             offer.tables, solution.projectors.tolist(), solution.cameras.tolist()
         )
-        partial = with_cheapest_cameras(self.partial, *devices, self.costs)
-        if partial is not None:
-            self._take(polished(partial, self.clock), "candidates")
+        partial = with_cameras_for(self.partial, *devices, self.costs, below)
+        while partial and self.costs.both(partial.projectors, partial.cameras) < below:
+            partial = polished(partial, self.clock)
+            plan = self._take(partial, "candidates")
+            if plan is self.plan:
+                return
+            # Fresh samples may fall short of a cover that is enough for its own.
+            partial = one_device_more(partial, plan, self.clock)
 
     def _by_poses(self, offer: JointOffer) -> None:
         """Leave a device out and move the others, as long as that does."""
@@ -181,7 +187,7 @@ class _Joint:
                 if devices is None:
                     return
                 partial = with_devices(self.partial, *devices)
-            if partial is None or not self._take(partial, "poses"):
+            if partial is None or self._take(partial, "poses") is not self.plan:
                 return
 
     def _widened(self, offer: JointOffer) -> None:
@@ -192,9 +198,12 @@ class _Joint:
         if partial:
             self._take(partial, self.found)
 
-    def _take(self, partial: PartialPlan, found: Found) -> bool:
-        """Take a plan that meets every requirement and is cheaper, or wider."""
-        partial = bounded_cameras(partial, self.clock)
+    def _take(self, partial: PartialPlan, found: Found) -> RigPlan:
+        """Take a plan that meets every requirement and is cheaper, or wider.
+
+        Returns:
+            The plan, which is then the best one, or isn't.
+        """
         plan = write_plan(partial, self.clock)
         missed, slack = shortfalls(plan), _slack(plan, partial)
         cost = self._cost_of(plan)
@@ -204,13 +213,15 @@ class _Joint:
         if missed or not (cheaper or (wider and cost <= before * (1.0 + 1e-9))):
             why = missed[0] if missed else "neither cheaper nor wider"
             self.clock.say(f"  not taken: {why}")
-            return False
+            return plan
         self.clock.say(
             f"  cost {before:g} -> {cost:g}, slack {_percent(self.slack)} -> "
             f"{_percent(slack)}"
         )
+        partial = bounded_cameras(partial, self.clock)
+        plan = write_plan(partial, self.clock)
         self.plan, self.partial, self.slack, self.found = plan, partial, slack, found
-        return True
+        return plan
 
     def _cost_of(self, plan: RigPlan) -> float:
         return self.costs.both(plan.projectors, plan.cameras)

@@ -22,9 +22,9 @@ from .tables import JointTables
 
 # How far out poses are offered, in spacings of the candidates.
 _SCALES = (1.0, 0.5, 0.25, 0.125)
-# Sets with a device left out that are pursued, and what they may lack at first, of all
-# samples that are asked for.
-_PURSUED, _LACKING = 3, 0.08
+# Devices that are left out at first: those without which least is lacking. Of these
+# sets those are moved that lack least after exchanges, and little of all samples.
+_TRIED, _PURSUED, _LACKING = 4, 2, 0.08
 # Of what must be lit and measured, kept to spare so that fresh samples agree.
 _SPARE = 0.005
 
@@ -89,8 +89,9 @@ def _left_out(
     views = [*range(len(partial.cameras))]
     left = [([q for q in lights if q != p], views) for p in lights if len(lights) > 1]
     left += [(lights, [d for d in views if d != c]) for c in views if len(views) > 1]
-    for projectors, cameras in left:
-        start = Exchange(tables, lit, measured, projectors, cameras)
+    starts = [Exchange(tables, lit, measured, *devices) for devices in left]
+    starts.sort(key=lambda one: (one.score, costs.both(*_of(one))))
+    for start in starts[:_TRIED]:
         start.run()
         yield start
 
