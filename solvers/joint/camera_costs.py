@@ -103,7 +103,9 @@ class CostStep:
     high: float
 
 
-def cost_steps(costs: NDArray[np.float64], least: float, below: float) -> list[CostStep]:
+def cost_steps(
+    costs: NDArray[np.float64], least: float, below: float
+) -> list[CostStep]:
     """Return what cameras may cost from `least` on and below a number, ascending.
 
     All sums of the costs, each cost as often as there are cameras of it; where these

@@ -1,4 +1,4 @@
-"""Covers by a handful of sets: all selections are looked at, faster than any program."""
+"""Covers by a handful of sets: all selections are looked at, without a program."""
 
 import numpy as np
 from numpy.typing import NDArray

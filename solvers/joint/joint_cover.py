@@ -121,9 +121,7 @@ class _Search:
     best: tuple[_Index, _Index] | None = None
     cost: float = np.inf
     light: float = 0.0
-    able: list[tuple[_Index, float]] = field(
-        default_factory=list[tuple[_Index, float]]
-    )
+    able: list[tuple[_Index, float]] = field(default_factory=list[tuple[_Index, float]])
     cuts: list[tuple[frozenset[int], float]] = field(
         default_factory=list[tuple[frozenset[int], float]]
     )
@@ -139,7 +137,9 @@ class _Search:
             self._improve(with_all.chosen)
         below = self.cost if np.isfinite(self.cost) else self._dearest()
         steps = cost_steps(
-            self.problem.camera_costs, with_all.bound, below - light.bound + _step(below)
+            self.problem.camera_costs,
+            with_all.bound,
+            below - light.bound + _step(below),
         )
         rows = [_Open(step, light.bound) for step in steps]
         while (row := self._next(rows)) is not None and not self.covers.exhausted:

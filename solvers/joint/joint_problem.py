@@ -102,7 +102,9 @@ class JointProblem:
         if pairs.size > MAX_PAIR_ENTRIES:
             raise ValueError(f"{pairs.size} pairs, at most {MAX_PAIR_ENTRIES} fit")
         if np.any(pairs & ~lit[:, None]):
-            raise ValueError("a pair measures a sample that its projector doesn't light")
+            raise ValueError(
+                "a pair measures a sample that its projector doesn't light"
+            )
         row_sets = np.zeros(n_e, dtype=np.int64)
         if self.row_sets is not None:  # pyright: ignore[reportUnnecessaryComparison]
             row_sets = whole_numbers("row_sets", self.row_sets)
@@ -140,7 +142,9 @@ class JointProblem:
         """Return which samples pairs of chosen devices measure, shape (n_e,)."""
         p = set_names("projectors", projectors, self.n_projectors)
         c = set_names("cameras", cameras, self.n_cameras)
-        return self.measured_by_rows(self._bits[np.ix_(p, c)].reshape(p.size * c.size, -1))
+        return self.measured_by_rows(
+            self._bits[np.ix_(p, c)].reshape(p.size * c.size, -1)
+        )
 
     def measured_by_rows(self, rows: NDArray[np.uint64]) -> _Mask:
         """Return which samples any of some bit rows holds, shape (n_e,)."""
@@ -185,9 +189,7 @@ class JointProblem:
         required = self.required_measured
         if not required.floors.any():
             total = np.array([float(required.total)])
-            return CoverProblem(
-                covers, costs=self.camera_costs, required_weight=total
-            )
+            return CoverProblem(covers, costs=self.camera_costs, required_weight=total)
         floors = np.zeros(1 + self.row_sets.max(initial=0))
         # The last row sets may have no sample, and then no floor.
         some = required.floors[: len(floors)]
@@ -225,9 +227,7 @@ class JointProblem:
             row_sets=np.repeat(np.arange(len(groups)), sizes),
         )
 
-    def _groups(
-        self, covers: _Mask, required: Requirement
-    ) -> list[tuple[_Mask, int]]:
+    def _groups(self, covers: _Mask, required: Requirement) -> list[tuple[_Mask, int]]:
         """Return groups of rows with what each asks; floors repeat their rows."""
         groups = [(covers, required.total)]
         for g, floor in enumerate(required.floors.tolist()):

@@ -65,7 +65,11 @@ def test_what_it_ends_with_is_scored_as_the_tables_say(seed):
     lit = tables.lit[:, exchange.projectors].any(axis=1).sum()
     best = np.array(
         [
-            max(tables.slack[e, c, p] for c in exchange.cameras for p in exchange.projectors)
+            max(
+                tables.slack[e, c, p]
+                for c in exchange.cameras
+                for p in exchange.projectors
+            )
             for e in range(_N)
         ]
     )

@@ -124,9 +124,7 @@ def projector_stage(partial: PartialPlan, projectors: Projectors) -> ProjectorSt
     weight = candidates.samples.samples.weight
     if len(projectors) >= stage.certificate.needed.lower_bound:
         area = float(candidates.reached.sum()) * weight
-        return counted(
-            replace(stage, projectors=projectors), projectors, area
-        )
+        return counted(replace(stage, projectors=projectors), projectors, area)
     first = len(candidates.projectors)
     candidates = candidates.joined(
         CandidateSet.over(candidates.scene, candidates.samples, projectors)

@@ -7,7 +7,7 @@ every requirement and it is cheaper, or as cheap and wider.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 from planning.model.document.input_records import RigRecord
@@ -19,6 +19,7 @@ from planning.model.document.joint_records import (
 from planning.model.errors import InputError
 from planning.model.plan import InterruptedPlanError, RigPlan
 from planning.model.progress import TIME_IS_UP, Stopwatch
+from planning.proofs.device_stock import within_stock
 from planning.report.assemble import write_plan
 from planning.report.partial_plan import PartialPlan, PlanRequest
 from planning.report.summary.shortfall import shortfalls
@@ -51,7 +52,11 @@ def check_joint(request: PlanRequest) -> None:
     wishes, rig = request.wishes, request.rig
     others = (
         (request.evaluates, "an evaluation", "nothing is sought there"),
-        (wishes.survive > 0, "survive = 1", "what may be lost is planned in two stages"),
+        (
+            wishes.survive > 0,
+            "survive = 1",
+            "what may be lost is planned in two stages",
+        ),
         ((wishes.views or 1) > 1, f"views = {wishes.views}", "it measures by one pair"),
         (wishes.robust is not None, "robust", "drawn rigs are of a two-stage plan"),
         (wishes.pattern == "none", "pattern = 'none'", "there are no projectors"),
@@ -170,6 +175,10 @@ class _Joint:
         devices = devices_of(
             offer.tables, solution.projectors.tolist(), solution.cameras.tolist()
         )
+        stock = self.plan.requirements.stock_of
+        kinds = zip(("projector", "camera"), devices, strict=True)
+        if not all(within_stock(some, stock(kind)) for kind, some in kinds):
+            return
         partial = with_cameras_for(self.partial, *devices, self.costs, below)
         while partial and self.costs.both(partial.projectors, partial.cameras) < below:
             partial = polished(partial, self.clock)

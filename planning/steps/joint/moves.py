@@ -57,9 +57,7 @@ def wider_slack(
 ) -> tuple[Projectors, Cameras] | None:
     """Return as many devices whose slack at the required share is larger."""
     target = offer.tables.target
-    tables = JointTables.of(
-        partial.scene, target, partial.projectors, partial.cameras
-    )
+    tables = JointTables.of(partial.scene, target, partial.projectors, partial.cameras)
     start = Exchange(
         tables,
         _spared(offer.lit).as_far_as(tables.lit.any(axis=1)),

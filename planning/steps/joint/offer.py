@@ -85,9 +85,7 @@ def joint_offer(partial: PartialPlan) -> JointOffer:
     lit_quota = Quotas.of(regions, reached, required.dominant_coverage)
     able = _measurable(partial, partial.projectors, target).any(axis=1) | measured
     quota = Quotas.of(regions, able, required.coverage)
-    sees = _measurable(
-        partial, (*partial.projectors, *projectors[:_LIGHTING]), target
-    )
+    sees = _measurable(partial, (*partial.projectors, *projectors[:_LIGHTING]), target)
     views = partial.camera_stage.cover.candidates.cameras
     cameras = tuple(views[c] for c in several_covers(sees, _OFFERED))
     return JointOffer(

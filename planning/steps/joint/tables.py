@@ -1,4 +1,4 @@
-"""What devices on offer light, and how well their pairs measure, on the same samples."""
+"""What devices on offer light, and how well their pairs measure, on some samples."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -242,7 +242,7 @@ def test_known_devices_must_be_enough():
 
 
 def test_without_light_to_give_it_is_a_cover_by_pairs():
-    """Of equal costs and nothing asked of light: `covers.paired` has the same answer."""
+    """Of equal costs and no light to give: `covers.paired` has the same answer."""
     rng = np.random.default_rng(5)
     n, n_p, n_c = 30, 5, 6
     lit = rng.random((n, n_p)) < 0.6

@@ -133,7 +133,10 @@ def test_costs_of_the_rig_are_those_of_the_plan(case, told, handmade):
         document["rig"]["projector"]["cost"] = 3.0
         document["rig"]["camera"]["cost"] = 0.5
 
-    assert any("joint.joint.cost" in one for one in found(case, handmade.tampered(told, dearer)))
+    assert any(
+        "joint.joint.cost" in one
+        for one in found(case, handmade.tampered(told, dearer))
+    )
 
     def stated(document):
         dearer(document)

@@ -37,12 +37,16 @@ def audit_joint(case: AuditCase, findings: AuditFindings) -> None:
     _audit_slack(case, record, below)
 
 
-def _audit_counts(case: AuditCase, record: JointRecord, findings: AuditFindings) -> None:
+def _audit_counts(
+    case: AuditCase, record: JointRecord, findings: AuditFindings
+) -> None:
     """Check the plan's numbers and cost, and that two stages took no less."""
     own = DeviceCount(
         projectors=len(case.kinds[0].devices),
         cameras=len(case.kinds[1].devices),
-        cost=sum(_cost(case, kind.name, d.model) for kind in case.kinds for d in kind.devices),
+        cost=sum(
+            _cost(case, kind.name, d.model) for kind in case.kinds for d in kind.devices
+        ),
     )
     slack = _ROUNDING * max(own.cost, 1.0)
     for name in ("projectors", "cameras", "cost"):
@@ -138,7 +142,7 @@ def _cost(case: AuditCase, kind: str, model: str) -> float:
 
 
 def best_slack(case: AuditCase) -> Array:
-    """Return each sample's slack by its best pair, -inf where none measures it, (n,)."""
+    """Return each sample's slack by its best pair, -inf where none measures it."""
     slack = np.full(len(case.samples), -np.inf)
     for p, projector in enumerate(case.projectors):
         for c, camera in enumerate(case.cameras):
@@ -164,9 +168,7 @@ def _slack_of(
     least = limits.projector.min_tangent_angle
     tangent = _angle(np.abs(dot(samples.steep, along)))
     known = np.any(samples.steep != 0.0, axis=1)
-    shares.append(
-        np.where(known, (tangent - least) / (0.5 * np.pi - least), np.inf)
-    )
+    shares.append(np.where(known, (tangent - least) / (0.5 * np.pi - least), np.inf))
     if rules.max_sigma_m is not None:
         names = NOISE_TERMS if rules.accuracy_of == "noise" else None
         sigma = deviation(error_terms(pair, rules), names)
