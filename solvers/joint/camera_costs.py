@@ -17,6 +17,8 @@ from .few_sets import MOST_SETS, cheapest_of_all
 from .joint_problem import JointProblem
 
 _Index = NDArray[np.int64]
+# Times the work of a cover that one of two requirements may take: there are few.
+_BOTH = 8.0
 # Wall time that no cover of counted work takes [s].
 _LONG = 3600.0
 # Sums of costs that are told apart; more are taken together.
@@ -59,20 +61,22 @@ class CoverCosts:
         """Return the cheapest cameras found with these projectors."""
         if projectors not in self._known:
             problem = self.problem.camera_cover(sorted(projectors))
-            self._known[projectors] = self._solved(problem, self.problem.most[1])
+            self._known[projectors] = self._solved(
+                problem, self.problem.most[1], self._budget
+            )
         return self._known[projectors]
 
     def projectors(self, cameras: _Index) -> Taken:
         """Return the cheapest projectors found with these cameras."""
         problem = self.problem.projector_cover(cameras)
-        return self._solved(problem, self.problem.most[0])
+        return self._solved(problem, self.problem.most[0], _BOTH * self._budget)
 
     def lighting(self, hits: list[NDArray[np.bool_]]) -> Taken:
         """Return the cheapest projectors that light enough, one of each hit's."""
         problem = self.problem.projector_cover(None, hits)
-        return self._solved(problem, self.problem.most[0])
+        return self._solved(problem, self.problem.most[0], self._budget)
 
-    def _solved(self, problem: CoverProblem, most: int | None) -> Taken:
+    def _solved(self, problem: CoverProblem, most: int | None, budget: float) -> Taken:
         self.left -= 1
         if problem.costs.size <= MOST_SETS:
             few = cheapest_of_all(problem, most)
@@ -85,7 +89,7 @@ class CoverCosts:
             max_sets=most,
             time_limit=_LONG,
             seed=self._seed,
-            budget=self._budget,
+            budget=budget,
             heaviest=False,
         )
         if found.status is SolveStatus.INFEASIBLE:

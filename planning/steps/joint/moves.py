@@ -7,6 +7,7 @@ what is lacking, then for slack. Samples that are fresh confirm elsewhere.
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import TypeVar
 
 from planning.projectors.candidate_set import CandidateSource
 from planning.proofs.quotas import Quotas
@@ -20,6 +21,9 @@ from .exchange import Exchange
 from .offer import JointOffer, devices_of, with_axes
 from .tables import JointTables
 
+_D = TypeVar("_D")
+# Poses around each device.
+_AROUND = 24
 # How far out poses are offered, in spacings of the candidates.
 _SCALES = (1.0, 0.5, 0.25, 0.125)
 # Devices that are left out at first: those without which least is lacking. Of these
@@ -126,11 +130,18 @@ def _around(
     rig = ready.request.rig
     source = CandidateSource(scene, ready.templates)
     every = rig.n_projector_poses * len(ready.templates)
-    lights = with_axes(partial, source.around(projectors, every, scale))
+    near = _some(source.around(projectors, every, scale), len(projectors))
+    lights = with_axes(partial, near)
     every = rig.n_camera_poses * len(ready.cameras)
     offer = scene.candidates(ready.cameras)
     views = with_clearance(scene, offer.around(movable(cameras), every, scale))
-    return lights, views
+    return lights, _some(views, len(cameras))
+
+
+def _some(poses: tuple[_D, ...], n_devices: int) -> tuple[_D, ...]:
+    """Return as many poses for each device as tables have room for, evenly taken."""
+    most = min(len(poses), _AROUND * n_devices)
+    return tuple(poses[k * len(poses) // most] for k in range(most))
 
 
 def _of(found: Exchange) -> tuple[Projectors, Cameras]:
