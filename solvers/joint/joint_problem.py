@@ -20,7 +20,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from solvers.bit_rows import pack_rows, unpack_rows
+from solvers.bit_rows import pack_rows, sparse_rows, unpack_rows
 from solvers.checked_numbers import real_numbers, set_names, whole_numbers
 from solvers.covers.cover_problem import CoverProblem
 
@@ -189,13 +189,15 @@ class JointProblem:
         required = self.required_measured
         if not required.floors.any():
             total = np.array([float(required.total)])
-            return CoverProblem(covers, costs=self.camera_costs, required_weight=total)
+            return CoverProblem(
+                sparse_rows(covers), costs=self.camera_costs, required_weight=total
+            )
         floors = np.zeros(1 + self.row_sets.max(initial=0))
         # The last row sets may have no sample, and then no floor.
         some = required.floors[: len(floors)]
         floors[: len(some)] = some
         return CoverProblem(
-            covers,
+            sparse_rows(covers),
             costs=self.camera_costs,
             required_weight=floors,
             required_total=float(required.total),
@@ -221,7 +223,7 @@ class JointProblem:
             groups = [(self.lit, 0)]
         sizes = [len(rows) for rows, _ in groups]
         return CoverProblem(
-            np.concatenate([rows for rows, _ in groups]),
+            sparse_rows(np.concatenate([rows for rows, _ in groups])),
             costs=self.projector_costs,
             required_weight=np.array([float(n) for _, n in groups]),
             row_sets=np.repeat(np.arange(len(groups)), sizes),

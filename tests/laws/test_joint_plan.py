@@ -4,13 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from support.little_work import draw_fewer
 from support.plain_shapes import box
 
 from geometry.shapes.sample_head.sample_head import sample_head
 from planning import load_rig, pipeline
-from planning.cli.main import commands
 from planning.model.errors import InputError, RigError
 from planning.report.partial_plan import PlanRequest
 from planning.report.summary.shortfall import shortfalls
@@ -30,7 +28,11 @@ _BODY = {"size_mm": [90.0, 90.0, 150.0], "centre_mm": [0.0, 0.0, -80.0]}
 def asked(rig=None, *, evaluates=False, cameras_by="both", **wishes):
     wishes = Wishes(3, joint=True, **wishes)
     return PlanRequest(
-        box((0.1, 0.1, 0.1)), rig or load_rig(), wishes, evaluates=evaluates, cameras_by=cameras_by
+        box((0.1, 0.1, 0.1)),
+        rig or load_rig(),
+        wishes,
+        evaluates=evaluates,
+        cameras_by=cameras_by,
     )
 
 
@@ -84,8 +86,10 @@ def test_a_cost_is_a_positive_number(cost, tmp_path):
 
 
 def test_the_command_refuses_in_one_line(tmp_path, small_job):
-    mesh = tmp_path / "head.obj"
-    assert CliRunner().invoke(commands, ["sample", "-o", str(mesh)]).exit_code == 0
+    mesh, solid = tmp_path / "box.obj", box((100.0, 100.0, 100.0))
+    corners = [f"v {x} {y} {z}" for x, y, z in solid.vertices]
+    faces = [f"f {a} {b} {c}" for a, b, c in solid.faces + 1]
+    mesh.write_text("\n".join([*corners, *faces]))
     ended = small_job.run(mesh, tmp_path, ["--joint", "--survive", "1"])
     assert ended.code == 3
     assert ended.lines == 1
@@ -168,7 +172,9 @@ def test_what_is_proposed_doesnt_depend_on_threads(planned):
         ready = replace(partial.ready, scene=scene)
         offered = joint_offer(replace(partial, ready=ready))
         rig = Costs(partial_rig(partial)).rig
-        answer = solve_joint(offered.problem(rig), known=offered.own, n_covers=6, budget=1e6)
+        answer = solve_joint(
+            offered.problem(rig), known=offered.own, n_covers=6, budget=1e6
+        )
         moved = wider_slack(replace(partial, ready=ready), offered)
         poses = [d.world_from_device for kind in moved or () for d in kind]
         found.append((offered.tables.slack, answer.projectors, answer.cameras, *poses))

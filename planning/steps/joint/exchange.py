@@ -46,7 +46,7 @@ class Exchange:
             self.tables.scene.check_cancelled()
 
     def _of(self, projectors: Sequence[int], cameras: Sequence[int]) -> Score:
-        lit = self.tables.lit[:, list(projectors)].any(axis=1)
+        lit = np.any(self.tables.lit[:, list(projectors)], axis=1)
         return self._scored(lit, self.tables.best(projectors, cameras))
 
     def _scored(self, lit: NDArray[np.bool_], best: _Slack) -> Score:
@@ -74,7 +74,7 @@ class Exchange:
         tables = self.tables
         with_these = tables.slack[:, self.cameras].max(axis=1)
         for others, old in _without_each(self.projectors):
-            lit = tables.lit[:, others].any(axis=1)
+            lit = np.any(tables.lit[:, others], axis=1)
             best = tables.best(others, self.cameras)
             for p in self._alike(tables.projectors, old, self.projectors):
                 score = self._scored(
@@ -84,7 +84,7 @@ class Exchange:
 
     def _cameras(self) -> Iterator[tuple[Score, list[int], list[int]]]:
         tables = self.tables
-        lit = tables.lit[:, self.projectors].any(axis=1)
+        lit = np.any(tables.lit[:, self.projectors], axis=1)
         with_these = tables.slack[:, :, self.projectors].max(axis=2)
         for others, old in _without_each(self.cameras):
             best = tables.best(self.projectors, others)
@@ -117,9 +117,8 @@ class Exchange:
         seeing = self._alike(tables.cameras, c, self.cameras)
         if not (offered and seeing):
             return
-        lit = (tables.lit[:, lights].any(axis=1)[:, None] | tables.lit[:, offered]).sum(
-            axis=0
-        )
+        present = np.any(tables.lit[:, lights], axis=1)
+        lit = (present[:, None] | tables.lit[:, offered]).sum(axis=0)
         short = np.maximum(self.lit.total - lit, 0)
         base = np.isfinite(tables.best(lights, views))
         with_views = base[:, None] | np.isfinite(

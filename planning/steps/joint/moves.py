@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import TypeVar
 
+import numpy as np
+
 from planning.projectors.candidate_set import CandidateSource
 from planning.proofs.quotas import Quotas
 from planning.report.partial_plan import PartialPlan
@@ -30,7 +32,7 @@ _SCALES = (1.0, 0.5, 0.25, 0.125)
 # sets those are moved that lack least after exchanges, and little of all samples.
 _TRIED, _PURSUED, _LACKING = 4, 2, 0.08
 # Of what must be lit and measured, kept to spare so that fresh samples agree.
-_SPARE = 0.005
+_SPARE = 0.01
 
 
 def one_device_fewer(
@@ -64,8 +66,8 @@ def wider_slack(
     tables = JointTables.of(partial.scene, target, partial.projectors, partial.cameras)
     start = Exchange(
         tables,
-        _spared(offer.lit).as_far_as(tables.lit.any(axis=1)),
-        _spared(offer.measured).as_far_as(tables.pairs.any(axis=(1, 2))),
+        _spared(offer.lit).as_far_as(np.any(tables.lit, axis=1)),
+        _spared(offer.measured).as_far_as(np.any(tables.pairs, axis=(1, 2))),
         [*range(len(partial.projectors))],
         [*range(len(partial.cameras))],
     )

@@ -80,8 +80,8 @@ def joint_offer(partial: PartialPlan) -> JointOffer:
     places = several_covers(lights.lit, _OFFERED)
     projectors = with_axes(partial, lights.of(places))
     regions = RegionFloors.of(scene, target)
-    reached = lights.reached | own.lit.any(axis=1)
-    measured = own.pairs.any(axis=(1, 2))
+    reached = lights.reached | np.any(own.lit, axis=1)
+    measured = np.any(own.pairs, axis=(1, 2))
     lit_quota = Quotas.of(regions, reached, required.dominant_coverage)
     able = _measurable(partial, partial.projectors, target).any(axis=1) | measured
     quota = Quotas.of(regions, able, required.coverage)
@@ -96,7 +96,7 @@ def joint_offer(partial: PartialPlan) -> JointOffer:
             (*partial.cameras, *cameras),
         ),
         (len(partial.projectors), len(partial.cameras)),
-        lit_quota.as_far_as(own.lit.any(axis=1)),
+        lit_quota.as_far_as(np.any(own.lit, axis=1)),
         quota.as_far_as(measured),
     )
 

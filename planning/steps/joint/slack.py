@@ -13,6 +13,8 @@ shadows are met or not and have no share; the pitch of rings is set to its limit
 purpose (`rings.ring_stage`). A sample's slack is that of its best pair.
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -56,7 +58,7 @@ def pair_slack(
     return slack
 
 
-def slack_at_share(slack: _Array, required: int) -> float:
+def slack_at_share(slack: NDArray[np.floating[Any]], required: int) -> float:
     """Return the slack that so many samples have at least; -inf where fewer have any.
 
     Slacks of samples are -inf where they aren't measured, shape (n,).

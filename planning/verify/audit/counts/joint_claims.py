@@ -6,7 +6,7 @@ slack is recomputed; of the two stages' plan, which is gone, only what can't be 
 
 import numpy as np
 
-from geometry.arrays import Array
+from geometry.arrays import Array, Ints
 from planning.model.document.joint_records import DeviceCount, JointRecord
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
@@ -154,7 +154,7 @@ def best_slack(case: AuditCase) -> Array:
 
 
 def _slack_of(
-    case: AuditCase, projector: AuditProjector, camera: AuditCamera, some: Array
+    case: AuditCase, projector: AuditProjector, camera: AuditCamera, some: Ints
 ) -> Array:
     """Return the least of the slacks of all limits, as shares of these, (k,)."""
     limits, samples = case.plan.requirements, case.samples.take(some)
