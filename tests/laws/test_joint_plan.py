@@ -15,7 +15,7 @@ from planning.report.summary.shortfall import shortfalls
 from planning.report.summary.summary import summary
 from planning.rig.wishes import Wishes
 from planning.steps.joint import joining, moves, offer
-from planning.steps.joint.completed import Costs
+from planning.steps.joint.completed import Costs, cameras_proved, projector_stage
 from planning.steps.joint.joining import check_joint
 from planning.steps.joint.moves import wider_slack
 from planning.steps.joint.offer import joint_offer
@@ -182,6 +182,34 @@ def test_what_is_proposed_doesnt_depend_on_threads(planned):
     assert len(one) == len(other)
     for a, b in zip(one, other, strict=True):
         assert np.array_equal(a, b)
+
+
+def test_numbers_other_than_the_fewest_are_told_as_such(planned):
+    _, _, partial = planned
+    own, one = partial.projectors, partial.stage.candidates.projectors[0]
+    fewest = partial.stage.certificate
+    assert fewest.needed.lower_bound == len(own)
+
+    more = projector_stage(partial, (*own, one))
+    as_many = projector_stage(partial, own)
+
+    assert more.certificate.count == more.certificate.needed.count == len(own) + 1
+    assert more.certificate.status == "feasible"
+    assert as_many.certificate.count == len(own)
+    # Fewer than are proved to be needed light too little.
+    assert projector_stage(partial, own[:-1]) is None
+
+
+def test_cameras_are_proved_again_for_their_projectors(planned):
+    _, _, partial = planned
+    cameras = (*partial.cameras, partial.camera_stage.cover.candidates.cameras[0])
+
+    stage = cameras_proved(partial, partial.projectors, cameras)
+
+    assert stage.cameras == cameras
+    assert stage.certificate.count == len(cameras)
+    assert stage.certificate.needed.lower_bound <= len(partial.cameras)
+    assert cameras_proved(partial, partial.projectors, partial.cameras[:1]) is None
 
 
 def partial_rig(partial):

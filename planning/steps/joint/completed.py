@@ -13,6 +13,8 @@ from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.projectors.candidate_set import CandidateSet
 from planning.projectors.exposures import with_exposures
 from planning.projectors.projector_stage import ProjectorStage
+from planning.projectors.proved_projectors import prove_fewest
+from planning.proofs import projector_bound
 from planning.proofs.candidate_certificate import counted
 from planning.proofs.selection import select_fewest
 from planning.report.partial_plan import PartialPlan
@@ -54,6 +56,8 @@ def with_cameras_for(
     """
     request = partial.request
     stage = projector_stage(partial, projectors)
+    if stage is None:
+        return None
     projectors = with_exposures(partial.scene, projectors)
     try:
         solution = place_for_axes(
@@ -90,8 +94,8 @@ def with_devices(
     request = partial.request
     stage = projector_stage(partial, projectors)
     projectors = with_exposures(partial.scene, projectors)
-    views = cameras_proved(partial, projectors, cameras)
-    if views is None:
+    views = cameras_proved(partial, projectors, cameras) if stage else None
+    if stage is None or views is None:
         return None
     rings = None
     if request.ring_axis is not None:
@@ -114,25 +118,33 @@ def with_devices(
     )
 
 
-def projector_stage(partial: PartialPlan, projectors: Projectors) -> ProjectorStage:
+def projector_stage(
+    partial: PartialPlan, projectors: Projectors
+) -> ProjectorStage | None:
     """Return the stage of other projectors, with what is proved of their number.
 
-    Of fewer than the fewest candidates: then they join these.
+    Fewer than the fewest candidates join these; None where they light too little of
+    the stage's samples.
     """
     stage = partial.stage
-    candidates = stage.candidates
-    weight = candidates.samples.samples.weight
-    if len(projectors) >= stage.certificate.needed.lower_bound:
-        area = float(candidates.reached.sum()) * weight
+    reached = stage.candidates.reached.sum()
+    area = float(reached) * stage.candidates.samples.samples.weight
+    if len(projectors) >= stage.certificate.needed.count:
         return counted(replace(stage, projectors=projectors), projectors, area)
-    first = len(candidates.projectors)
-    candidates = candidates.joined(
-        CandidateSet.over(candidates.scene, candidates.samples, projectors)
+    before = stage.candidates
+    candidates = before.joined(
+        CandidateSet.over(before.scene, before.samples, projectors)
     )
-    known = first + np.arange(len(projectors))
+    known = len(before.projectors) + np.arange(len(projectors))
     selection = select_fewest(candidates.cover, known=known)
+    if selection.status == "infeasible" or selection.needed > len(projectors):
+        return None
+    ready, request = partial.ready, partial.request
+    effort = projector_bound.PROVE if request.prove else projector_bound.DEFAULT
     stage = ProjectorStage.over(candidates, selection)
-    area = float(candidates.reached.sum()) * weight
+    proved = prove_fewest(partial.scene, stage, ready.templates, effort)
+    if len(proved.projectors) == len(projectors):
+        stage = proved
     return counted(replace(stage, projectors=projectors), projectors, area)
 
 
@@ -141,18 +153,19 @@ def cameras_proved(
 ) -> CameraStage | None:
     """Return the stage of cameras as they stand, with what is proved of their number.
 
-    Where they are fewer than any candidates for these projectors, they join these.
+    Where they are fewer than any candidates for these projectors, they join these; None
+    where they measure too little of the stage's samples.
     """
     scene = partial.scene.among(projectors)
     views = partial.camera_stage.cover.candidates
     try:
         cover = plan_cameras(scene, projectors, views)
         if len(cameras) < cover.selection.needed:
-            first = len(views.cameras)
-            views = views.joined(cameras)
-            known = first + np.arange(len(cameras))
-            cover = plan_cameras(scene, projectors, views, known)
+            known = len(views.cameras) + np.arange(len(cameras))
+            cover = plan_cameras(scene, projectors, views.joined(cameras), known)
     except NothingMeasuredError:
+        return None
+    if len(cameras) < cover.selection.needed:
         return None
     stage = camera_stage(scene, cover)
     area = cover.measured.any(axis=1).sum() * cover.samples.target.samples.weight
