@@ -1,16 +1,16 @@
 """Plans of projectors and cameras together beside those of one kind after the other.
 
 Of the sample and four meshes of `../shared/data/meshes` (those named, if any), each in
-the unit or size that `tests/support/shared_meshes.py` states, with the default rig and
-with what a calibration leaves (0.02 degrees, 0.05 mm): then cameras are many. Printed
-are numbers of projectors and cameras of either plan, what found the joint ones, the
+the unit or size that `tests/support/shared_meshes.py` states, with the default rig.
+Printed are numbers of projectors and cameras of either plan, what found the joint ones, the
 bound on both together over the devices on offer, the margin before and after both kinds
 moved together, what fresh samples say is lit and measured of what can be, false claims
 that the audit finds, and processor seconds of the plan of two stages and of the rest.
 
-    PYTHONPATH=.:tests python -m benchmarks.plans.joint [--dear] [MESH ...]
+    PYTHONPATH=.:tests python -m benchmarks.plans.joint [--calibrated] [--dear] [MESH ..]
 
-With `--dear` a projector costs three cameras.
+With `--calibrated` a calibration leaves 0.02 degrees and 0.05 mm, which takes many
+cameras; with `--dear` a projector costs three of them.
 """
 
 import sys
@@ -34,14 +34,17 @@ _SOME = (
     "tm_fixed_top.ply",
     "vtk_bunny.ply",
 )
-_CALIBRATION = {"angle_deg": 0.02, "position_mm": 0.05}
 _MANY = 12
 
 
 def main(words: list[str]) -> None:
     """Print the table, a mesh as soon as it is planned."""
-    dear = "--dear" in words
-    names = [word for word in words if word != "--dear"]
+    changes: dict[str, dict[str, float]] = {}
+    if "--calibrated" in words:
+        changes["calibration"] = {"angle_deg": 0.02, "position_mm": 0.05}
+    if "--dear" in words:
+        changes |= {"projector": {"cost": 3.0}, "camera": {"cost": 1.0}}
+    names = [word for word in words if not word.startswith("--")]
     print(
         "| mesh | two stages | together | found by | bound over (projectors, cameras, "
         "samples) | margin | lit, measured | false claims | missed | seconds: two "
@@ -49,12 +52,12 @@ def main(words: list[str]) -> None:
     )
     print("|---" * 10 + "|", flush=True)
     for name, path, options, up in _meshes(names):
-        print(_row(name, path, options, up, dear=dear), flush=True)
+        print(_row(name, path, options, up, changes), flush=True)
 
 
 def _meshes(
     names: list[str],
-) -> Iterator[tuple[str, Path, dict[str, object], str | None]]:
+) -> Iterator[tuple[str, Path, dict[str, Any], str | None]]:
     if not names or "face.obj" in names:
         yield "face.obj", ROOT / "face.obj", {}, None
     for mesh in shared_meshes.MESHES:
@@ -65,12 +68,14 @@ def _meshes(
 
 
 def _row(
-    name: str, path: Path, options: dict[str, Any], up: str | None, *, dear: bool
+    name: str,
+    path: Path,
+    options: dict[str, Any],
+    up: str | None,
+    changes: dict[str, dict[str, float]],
 ) -> str:
     """Plan a mesh and return its line."""
-    rig = load_rig("default").replace(calibration=_CALIBRATION)
-    if dear:
-        rig = rig.replace(projector={"cost": 3.0}, camera={"cost": 1.0})
+    rig = load_rig("default").replace(**changes)
     first: list[float] = []
     begin = time.process_time()
     plan = plan_rig(

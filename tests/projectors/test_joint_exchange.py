@@ -8,7 +8,7 @@ import pytest
 from planning.proofs.quotas import Quotas, RegionFloors
 from planning.steps.joint.exchange import Exchange
 from planning.steps.joint.offer import several_covers
-from planning.steps.joint.slack import slack_at_share
+from planning.steps.joint.slack import pair_slack, slack_at_share
 from planning.steps.joint.tables import JointTables
 
 _N = 8
@@ -127,3 +127,41 @@ def test_candidates_come_cover_by_cover():
     covers[:3, 1] = covers[3:, 2] = covers[0, 3] = True
     assert several_covers(covers, 9).tolist() == [0, 1, 2, 3]
     assert several_covers(covers, 2).tolist() == [0, 1]
+
+
+def quality(**figures):
+    """A pair on one sample, as far from every limit as can be but for figures."""
+    given = {
+        "conditioning": 1e9,
+        "sigma": 0.0,
+        "facing": 1.0,
+        "light_cos": None,
+    } | figures
+    arrays = {k: v if v is None else np.array([v]) for k, v in given.items()}
+    facing = arrays.pop("facing")
+    return SimpleNamespace(view=SimpleNamespace(facing=facing), **arrays)
+
+
+@pytest.mark.parametrize(
+    ("figures", "share"),
+    [
+        ({}, 1.0),
+        ({"conditioning": 0.4}, 0.75),
+        ({"sigma": 0.75e-3}, 0.25),
+        ({"facing": np.cos(0.6)}, 0.4),
+        ({"light_cos": np.cos(0.5)}, 0.5),
+        ({"light_cos": np.cos(1.9)}, 0.1),
+        ({"sigma": 0.5e-3, "conditioning": 0.2}, 0.5),
+    ],
+)
+def test_slack_of_a_pair_is_the_least_share_of_its_limits(figures, share):
+    limits = SimpleNamespace(min_conditioning=0.1, max_sigma_m=1e-3, angles=(0.0, 2.0))
+    found = pair_slack(quality(**figures), limits, SimpleNamespace(max_incidence=1.0))
+    # Half of what lies between both angles is 1 rad.
+    assert found[0] == pytest.approx(share)
+
+
+def test_what_isnt_limited_has_no_share():
+    limits = SimpleNamespace(min_conditioning=0.0, max_sigma_m=None, angles=(0.0, 2.0))
+    found = pair_slack(quality(sigma=1.0), limits, SimpleNamespace(max_incidence=1.0))
+    assert found[0] == 1.0
