@@ -2,14 +2,15 @@
 
 Of the sample and four meshes of `../shared/data/meshes` (those named, if any), each in
 the unit or size that `tests/support/shared_meshes.py` states, with the default rig.
-Printed are numbers of projectors and cameras of either plan, what found the joint ones, the
-bound on both together over the devices on offer, the margin before and after both kinds
-moved together, what fresh samples say is lit and measured of what can be, false claims
-that the audit finds, and processor seconds of the plan of two stages and of the rest.
+Printed are numbers of projectors and cameras of either plan, what found the joint ones,
+the bound on both together over the devices on offer, the margin before and after both
+kinds moved together, what fresh samples say is lit and measured of what can be, false
+claims that the audit finds, requirements missed, and processor seconds of the plan of
+two stages and of the rest.
 
-    PYTHONPATH=.:tests python -m benchmarks.plans.joint [--calibrated] [--dear] [MESH ..]
+    PYTHONPATH=.:tests python -m benchmarks.plans.joint [--calibrated] [--dear] [MESH]
 
-With `--calibrated` a calibration leaves 0.02 degrees and 0.05 mm, which takes many
+With `--calibrated` a calibration leaves 0.02 degrees and 0.05 mm, which takes more
 cameras; with `--dear` a projector costs three of them.
 """
 

@@ -19,6 +19,8 @@ from .joint_problem import JointProblem
 _Index = NDArray[np.int64]
 # Times the work of a cover that one of two requirements may take: there are few.
 _BOTH = 8.0
+# Covers that one counts for whose count isn't settled.
+_UNSETTLED = 6
 # Wall time that no cover of counted work takes [s].
 _LONG = 3600.0
 # Sums of costs that are told apart; more are taken together.
@@ -94,6 +96,9 @@ class CoverCosts:
         )
         if found.status is SolveStatus.INFEASIBLE:
             return Taken(None, np.inf, np.inf)
+        if not found.lower_bound >= found.cost * (1.0 - SAME):
+            # It has spent all its work.
+            self.left -= _UNSETTLED - 1
         if not found.status.has_point:
             return Taken(None, np.inf, found.lower_bound)
         return Taken(found.selected, found.cost, min(found.lower_bound, found.cost))
