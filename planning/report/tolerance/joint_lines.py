@@ -22,19 +22,24 @@ def joint_lines(plan: RigPlan) -> list[str]:
 
 
 def joint_words(plan: RigPlan) -> tuple[str, str] | None:
-    """Return a label, and what planning together saved with the bound, in a line."""
+    """Return a label, and in few words what was saved and what is proved of it."""
     record = plan.document.joint
     if record is None:
         return None
-    return "JOINT", f"{saved_words(plan, record)}; {bound_words(plan, record)}"
+    least = "in cost" if _costed(plan) else "of both together"
+    if record.status == "optimal":
+        proof = f"{record.needed:g} {least} are proved the least of the candidates"
+    else:
+        proof = f"at least {record.lower_bound:g} {least} of the candidates are needed"
+    return "JOINT", f"{saved_words(plan, record)}; {proof}"
 
 
 def saved_words(plan: RigPlan, record: JointRecord) -> str:
     """Return what the plan takes, and what one kind after the other took."""
     before, after = record.two_stage, record.joint
     if (before.projectors, before.cameras) == (after.projectors, after.cameras):
-        none = "no fewer or cheaper devices than projectors first, then cameras"
-        return f"{none}: {_devices(plan, after)}"
+        than = "fewer or cheaper than projectors first, then cameras"
+        return f"none {than}: {_devices(plan, after)}"
     return (
         f"{_devices(plan, after)} instead of {_devices(plan, before)} of projectors "
         f"first, then cameras{_FOUND[record.found]}"

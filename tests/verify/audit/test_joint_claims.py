@@ -157,4 +157,6 @@ def test_the_summary_says_what_was_saved_and_what_is_proved(told):
         "JOINT    2 projectors and 2 cameras instead of 2 projectors and 3 cameras"
     )
     assert "at least 3 devices are needed, 4 suffice of 3 projectors" in lines[1]
-    assert joint_words(told)[0] == "JOINT"
+    label, words = joint_words(told)
+    assert label == "JOINT"
+    assert words.endswith("at least 3 of both together of the candidates are needed")
