@@ -19,6 +19,7 @@ class Wishes:
     the share of drawn rigs that must meet what is asked; None: none is drawn.
     `views` pairs at least measure what counts, and any `survive` devices may be lost.
     `joint` asks for projectors and cameras that were planned together.
+    Sensor heads, of a rig that has them, are at most `max_heads`.
     """
 
     max_projectors: int
@@ -37,3 +38,4 @@ class Wishes:
     views: int | None = None
     survive: int = 0
     joint: bool = False
+    max_heads: int | None = None

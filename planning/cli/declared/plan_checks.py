@@ -17,9 +17,17 @@ def check_options(options: dict[str, Any]) -> None:
     if options["unit"] and options["size_mm"] is not None:
         raise click.UsageError("give --unit or --size-mm, not both")
     _check_target(options)
+    if options["max_heads"] is None and options["max_projectors"] is None:
+        raise click.UsageError("give --max-projectors N, or --max-heads N of a [head]")
+    if options["max_heads"] is not None:
+        for name in ("max_projectors", "max_cameras"):
+            if options[name] is not None:
+                raise click.UsageError(
+                    f"give --max-heads or --{name.replace('_', '-')}, not both"
+                )
     if options["pattern"] == "none":
         raise click.UsageError("--pattern none isn't built yet: use rings or dense")
-    if options["pattern"] != "rings":
+    if options["pattern"] == "dense":
         _check_without_rings(options)
 
 

@@ -30,6 +30,7 @@ from .input_records import (
 from .joint_records import JointRecord
 from .part import Part
 from .ring_records import RingAxes
+from .station_records import StationsRecord
 from .survival_records import SurvivalRecord
 
 FORMAT = "ringrig-plan"
@@ -101,6 +102,7 @@ class PlanDocument(Part):
     robust: RobustRecord | None = None
     survival: SurvivalRecord | None = None
     joint: JointRecord | None = None
+    stations: StationsRecord | None = None
     camera_groups: tuple[tuple[str, ...], ...] = ()
     cost: CostRecord
     members: tuple[MemberRecord, ...]

@@ -39,6 +39,7 @@ def device_lines(plan: RigPlan) -> list[str]:
         lines.append(
             f"{device.id:<4} {x:9.1f} {y:9.1f} {z:9.1f}    {pan:15.1f} {tilt:7.1f} "
             f"{roll:7.1f}   {azimuth:8.1f} {elevation:10.1f}   {distance:18.1f}"
+            + (f"   {device.station}" if device.station else "")
             + (f"   {device.model}" if device.model else "")
             + (f"   existing: {device.existing}" if device.existing else "")
         )

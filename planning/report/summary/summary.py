@@ -20,6 +20,7 @@ from .light_lines import light_lines
 from .proof_lines import proof_lines
 from .ring_lines import code_lines, range_lines, ring_lines
 from .robust_lines import robust_lines
+from .station_lines import station_lines
 from .warning_lines import warning_lines
 
 # An object under this share of the field is taken to be in another unit.
@@ -44,6 +45,7 @@ def summary(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
         *proof_lines(plan),
         *coverage_lines(plan),
         *light_lines(plan),
+        *station_lines(plan),
         *survival_lines(plan),
         *joint_lines(plan),
         *robust_lines(plan),

@@ -67,6 +67,8 @@ def check_joint(request: PlanRequest) -> None:
             "the paper's route is of given projectors",
         ),
         (bool(rig.table.existing), "existing devices", "all are sought together"),
+        (rig.head is not None, "a [head]", "its devices come together anyway"),
+        (rig.turntable is not None, "a [turntable]", "its pairs are of turned parts"),
     )
     for asked, what, why in others:
         if asked:

@@ -71,6 +71,7 @@ def camera_figures(plan: RigPlan, *, threads: int) -> tuple[CameraFigures, ...]:
             for planned, light, both in zip(
                 plan.projectors, projectors, pairs, strict=True
             )
+            if planned.station in ("", camera.station)
         }
         pixels = mine[:, 2] / camera.device.focal_px
         figures.append(
