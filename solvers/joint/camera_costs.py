@@ -20,7 +20,7 @@ _Index = NDArray[np.int64]
 # Times the work of a cover that one of two requirements may take: there are few.
 _BOTH = 8.0
 # Covers that one counts for whose count isn't settled.
-_UNSETTLED = 6
+_UNSETTLED = 4
 # Wall time that no cover of counted work takes [s].
 _LONG = 3600.0
 # Sums of costs that are told apart; more are taken together.

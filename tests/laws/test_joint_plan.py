@@ -66,6 +66,11 @@ def test_devices_with_bodies_or_that_stand_are_refused():
         check_joint(asked(rig.replace(camera={"body": _BODY})))
 
 
+def test_devices_that_come_together_are_refused():
+    with pytest.raises(InputError, match=r"joint with a \[head\]"):
+        check_joint(asked(load_rig("gom-atos-core-300")))
+
+
 def test_costs_are_stated_of_all_models_or_of_none():
     rig = load_rig()
     with pytest.raises(InputError, match="write cost for each model, or for none"):

@@ -38,7 +38,7 @@ Planned = Callable[[PlanRequest, Stopwatch, Keep | None], tuple[RigPlan, Partial
 Found = Literal["two stages", "candidates", "poses"]
 # Covers that the joint program may solve, counted work of each, and times that a
 # device is left out.
-_COVERS, _WORK, _FEWER = 300, 5e7, 3
+_COVERS, _WORK, _FEWER = 400, 1e8, 3
 # Slack that is worth other poses.
 _GAIN = 5e-3
 
