@@ -29,6 +29,7 @@ from planning.verify.verification import Verification, verify_plan
 from .steps.carried import check_carried, devices_of_heads, pattern_of_rig
 from .steps.checked import axes_may_help, missed_by, with_check
 from .steps.heads import planned_heads
+from .steps.joint.joining import jointly
 from .steps.prepare import prepared, request_of, standing_devices
 from .steps.stages import (
     bounded_cameras,
@@ -74,6 +75,7 @@ def plan_rig(
     robust: float | None = None,
     views: int | None = None,
     survive: int = 0,
+    joint: bool = False,
     pattern: Pattern | None = None,
     seed: int = 0,
     threads: int | None = None,
@@ -121,6 +123,8 @@ def plan_rig(
             counts as covered; None: one.
         survive: Devices, 0 or 1, of which any may be lost: what is left still meets
             the requirements.
+        joint: Whether projectors and cameras are then sought together, the cheapest,
+            and moved together (`docs/method/joint.md`).
         pattern: What projectors show: `rings`, or a `dense` code of every pixel; None:
             that, where the rig has a head or a turntable.
         seed: The same seed gives the same plan.
@@ -171,6 +175,7 @@ def plan_rig(
         robust=robust,
         views=views,
         survive=survive,
+        joint=joint,
         pattern=pattern_of_rig(rig, pattern),
     )
     # BLAS must not split sums differently with another number of threads.
@@ -191,7 +196,7 @@ def plan_rig(
         )
         check_carried(request)
         check_survival(request)
-        planned = _evaluated if evaluates else robustly(_planned)
+        planned = jointly(_evaluated if evaluates else robustly(_planned))
         plan, partial = planned(request, clock, keep)
         if check and not plan.document.truncated:
             plan = _checked(plan, partial, clock, keep, checked)

@@ -42,6 +42,7 @@ _ASKED = (
     "robust",
     "views",
     "survive",
+    "joint",
     "pattern",
     "seed",
     "prove",

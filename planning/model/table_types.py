@@ -50,7 +50,7 @@ Name = Annotated[str, Field(min_length=1)]
 _ROTATION = 1e-4
 _MOST_SHOWN = 60
 # Keys of a table that need no source.
-_NO_FIGURES = {"name", "device", "description", "sources", "count"}
+_NO_FIGURES = {"name", "device", "description", "sources", "count", "cost"}
 # No length in mm, angle or number of pixels or poses is as large; squares of what is
 # larger by far overflow.
 _LARGEST = 1e9

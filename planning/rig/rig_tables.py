@@ -65,6 +65,7 @@ class DeviceTable(SourcedTable):
     name: Name
     device: Name | None = None
     count: Annotated[int, Field(ge=1, le=MOST_DEVICES)] | None = None
+    cost: Annotated[float, Field(ge=1e-6, le=1e9)] | None = None
     body: BodyTable | None = None
     mount: MountTable | None = None
 

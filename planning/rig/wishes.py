@@ -18,6 +18,7 @@ class Wishes:
     dominant regions, and the whole surface of a body known by its ranges. `robust` is
     the share of drawn rigs that must meet what is asked; None: none is drawn.
     `views` pairs at least measure what counts, and any `survive` devices may be lost.
+    `joint` asks for projectors and cameras that were planned together.
     Sensor heads, of a rig that has them, are at most `max_heads`.
     """
 
@@ -36,4 +37,5 @@ class Wishes:
     robust: float | None = None
     views: int | None = None
     survive: int = 0
+    joint: bool = False
     max_heads: int | None = None

@@ -49,6 +49,8 @@ class Draws:
     surviving_rings: Draw = Draw(6000, 420)
     baselines: Draw = Draw(6000, 300)
     confirming_baselines: Draw = Draw(16_000, 301)
+    joint: Draw = Draw(1000, 600)
+    joint_margins: Draw = Draw(6000, 610)
     rings: Draw = Draw(6000, 400)
     claims: Draw = Draw(12_000, 900)
     region_claims: Draw = Draw(400, 904)

@@ -1,4 +1,4 @@
-"""`--views` and `--survive`: what is measured several times, and what may be lost."""
+"""`--views`, `--survive` and `--joint`: pairs that count, losses, devices together."""
 
 from collections.abc import Callable
 from typing import Any
@@ -9,7 +9,7 @@ _Command = Callable[..., Any]
 
 
 def survival_options(command: _Command) -> _Command:
-    """Declare how many views count, and how many devices may be lost."""
+    """Declare how many views count, how many may be lost, and the joint plan."""
     views = click.option(
         "--views",
         type=click.IntRange(1, 8),
@@ -25,4 +25,10 @@ def survival_options(command: _Command) -> _Command:
         help="1: when any one projector or camera is lost, the others still meet the "
         "requirements [default: 0].",
     )
-    return views(survive(command))
+    joint = click.option(
+        "--joint",
+        is_flag=True,
+        help="Then seek the cheapest projectors and cameras together, and move them "
+        "together; `cost` of devices in the rig file counts.",
+    )
+    return views(survive(joint(command)))

@@ -124,6 +124,7 @@ class ModelRecord(Part):
 
     Attributes:
         count: How many of it there are; None: any number.
+        cost: Of one, in a unit of the user's own; None: not stated.
     """
 
     name: str = ""
@@ -138,6 +139,7 @@ class ModelRecord(Part):
     body: Body | None = None
     light: str = ""
     count: int | None = None
+    cost: float | None = None
 
     @property
     def optics(self) -> PinholeModel | ParallelModel:
@@ -204,6 +206,11 @@ class RigRecord(Part):
         """Return a model by the name that devices give; of none known the first."""
         models = self.models(kind)
         return next((model for model in models if model.name == name), models[0])
+
+    def cost_of(self, kind: str, name: str) -> float:
+        """Return what one device of a model costs; 1 where the rig states none."""
+        cost = self.model_of(kind, name).cost
+        return 1.0 if cost is None else cost
 
     def figures_of(self, kind: str, names: Iterable[str]) -> list[FiguresRecord]:
         """Return the figures of the models that devices name; of none the first's."""

@@ -27,6 +27,7 @@ from .input_records import (
     SurfaceRecord,
     Units,
 )
+from .joint_records import JointRecord
 from .part import Part
 from .ring_records import RingAxes
 from .station_records import StationsRecord
@@ -100,6 +101,7 @@ class PlanDocument(Part):
     evaluation: EvaluationRecord | None = None
     robust: RobustRecord | None = None
     survival: SurvivalRecord | None = None
+    joint: JointRecord | None = None
     stations: StationsRecord | None = None
     camera_groups: tuple[tuple[str, ...], ...] = ()
     cost: CostRecord

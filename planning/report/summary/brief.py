@@ -13,6 +13,7 @@ from geometry.poses import horizontal_axes
 from planning.model.document.certificates import Certificate
 from planning.model.plan import RigPlan
 from planning.model.words import count_words, percent
+from planning.report.tolerance.joint_lines import joint_words
 from planning.report.tolerance.robust_lines import robust_cost
 from planning.report.tolerance.survival_lines import counted_words, losses_words
 
@@ -204,9 +205,10 @@ def _fewest(plan: RigPlan) -> Iterator[_Block]:
 
 
 def _surviving(plan: RigPlan) -> Iterator[_Block]:
-    """Say what any one loss leaves, and what it costs to stand it."""
-    if losses := losses_words(plan):
-        yield *losses, 2
+    """Say what any one loss leaves and costs, and what planning together saved."""
+    for words in (losses_words(plan), joint_words(plan)):
+        if words is not None:
+            yield *words, 2
 
 
 def _robust(plan: RigPlan) -> Iterator[_Block]:

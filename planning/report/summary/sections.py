@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from planning.model.plan import RigPlan
+from planning.report.tolerance.joint_lines import joint_lines
 from planning.report.tolerance.robust_lines import robust_lines
 from planning.report.tolerance.survival_lines import survival_lines
 
@@ -69,7 +70,7 @@ SECTIONS = (
     Section(
         "proofs",
         "what was proved of the numbers of devices, and over which poses.",
-        proof_lines,
+        lambda plan: [*proof_lines(plan), *joint_lines(plan)],
     ),
     Section(
         "marginal",

@@ -10,6 +10,7 @@ from planning.model.document.input_records import MeshRecord
 from planning.model.plan import RigPlan
 from planning.model.requirements import Workspace
 from planning.model.words import count_words, labelled, percent
+from planning.report.tolerance.joint_lines import joint_lines
 from planning.report.tolerance.robust_lines import robust_lines
 from planning.report.tolerance.survival_lines import survival_lines
 
@@ -46,6 +47,7 @@ def summary(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
         *light_lines(plan),
         *station_lines(plan),
         *survival_lines(plan),
+        *joint_lines(plan),
         *robust_lines(plan),
         *range_lines(plan.document),
         *ring_lines(plan),

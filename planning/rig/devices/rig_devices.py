@@ -162,13 +162,14 @@ def device_document(
         **device.to_document(),
         "figures": table.model_dump(
             mode="json",
-            exclude={"name", "device", "sources", "count"},
+            exclude={"name", "device", "sources", "count", "cost"},
             exclude_none=True,
             exclude_unset=True,
         ),
         "sources": {key: table.sources.get(key, _UNSAID) for key in table.figures()},
         **({} if body is None else {"body": asdict(body)}),
         **({} if table.count is None else {"count": table.count}),
+        **({} if table.cost is None else {"cost": table.cost}),
     }
 
 

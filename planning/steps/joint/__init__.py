@@ -1,0 +1,1 @@
+"""Projectors and cameras planned together, after the plan that takes one by one."""

@@ -1,0 +1,1 @@
+"""Projectors and cameras chosen together, where each is worth what the other allows."""
