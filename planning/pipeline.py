@@ -27,6 +27,8 @@ from planning.scene.interest import Select, Weight
 from planning.scene.ranges.ranged_body import RangedBody
 from planning.verify.verification import Verification, verify_plan
 
+from .steps.cameras_alone.refusals import check_alone
+from .steps.cameras_alone.stages import plan_alone
 from .steps.checked import with_check
 from .steps.prepare import prepared, request_of, standing_devices
 from .steps.stages import (
@@ -94,7 +96,7 @@ def plan_rig(
         max_projectors: Projectors at most; None: the fixed devices and those of the rig
             file are evaluated as they stand. None is sought or moved, nothing is proved
             of their number, and limits of the workspace that they break are told and
-            refuse nothing.
+            refuse nothing. 0 with the pattern `none`.
         max_cameras: Cameras at most; None: as many as the coverage needs.
         target: The `dominant` regions, or the whole `surface`; None: the former, and
             the latter of a body known by its ranges.
@@ -114,10 +116,12 @@ def plan_rig(
             errors are smallest, or `auto`; None: the rig's.
         robust: Share of drawn rigs that meet the requirements; None: none is drawn.
         views: Different pairs of projector and camera, at least, that measure what
-            counts as covered; None: one.
+            counts as covered; None: one. Of the pattern `none` cameras that see it, of
+            which some pair measures it; None: two.
         survive: Devices, 0 or 1, of which any may be lost: what is left still meets
             the requirements.
-        pattern: What projectors show: `rings`, or a `dense` code of every pixel.
+        pattern: What projectors show: `rings`, or a `dense` code of every pixel; `none`:
+            there is no projector, and pairs of cameras measure by the object's texture.
         seed: The same seed gives the same plan.
         threads: Worker threads; no result depends on it. None: one for each core.
         check: Whether the plan is audited and reconstructed from pixels.
@@ -182,16 +186,20 @@ def plan_rig(
             evaluates=evaluates,
         )
         check_survival(request)
-        planned = _evaluated if evaluates else robustly(_planned)
+        if pattern == "none":
+            check_alone(request)
+            planned = _alone
+        else:
+            planned = _evaluated if evaluates else robustly(_planned)
         plan, partial = planned(request, clock, keep)
         if check and not plan.document.truncated:
-            plan = _checked(plan, partial, clock, keep, checked)
-            if axes_may_help(plan, partial):
+            plan = _checked(plan, request.threads, clock, keep, checked)
+            if partial is not None and axes_may_help(plan, partial):
                 clock.say("  centred ring axes don't pass the check: free ones")
                 freed = replace(request, axis_wanted="free")
                 other, partial = planned(freed, clock, keep)
                 if not other.document.truncated:
-                    other = _checked(other, partial, clock, keep, checked)
+                    other = _checked(other, request.threads, clock, keep, checked)
                     plan = plan if missed_by(other, check=True) else other
     missed = missed_by(plan, check=check)
     if missed and on_miss == "raise":
@@ -215,6 +223,13 @@ def missed_by(plan: RigPlan, *, check: bool) -> tuple[str, ...]:
     if check and plan.document.reconstruction is None:
         missed += ("the check wasn't made: the time limit came first",)
     return missed
+
+
+def _alone(
+    request: PlanRequest, clock: Stopwatch, _keep: Keep | None
+) -> tuple[RigPlan, None]:
+    """Cameras alone."""
+    return plan_alone(request, clock), None
 
 
 def _evaluated(
@@ -287,7 +302,7 @@ def _first_plan(request: PlanRequest, clock: Stopwatch) -> PartialPlan:
 
 def _checked(
     plan: RigPlan,
-    partial: PartialPlan,
+    threads: int,
     clock: Stopwatch,
     keep: Keep | None,
     checked: Checked | None,
@@ -304,7 +319,7 @@ def _checked(
             keep(plan)
         with clock.stage("check", "check: audit, then reconstruction from pixels"):
             verification = verify_plan(
-                plan, threads=partial.request.threads, progress=clock.say_in_time
+                plan, threads=threads, progress=clock.say_in_time
             )
     except KeyboardInterrupt:
         raise InterruptedPlanError(cut) from None
@@ -312,4 +327,4 @@ def _checked(
         return cut
     if checked is not None:
         checked(plan, verification)
-    return with_check(plan, verification, partial, clock)
+    return with_check(plan, verification, clock)

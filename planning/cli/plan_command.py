@@ -55,7 +55,7 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
     limit = None if limit is None else _OURS * limit
     clock = Stopwatch(time_limit=limit, begin=begin)
     path = Path(options["ranges"] or options["meshes"][0])
-    result = "plan" if options["max_projectors"] else "evaluation"
+    result = "evaluation" if options["max_projectors"] is None else "plan"
     folder = options["output"] or Path(f"{path.name.split('.')[0]}-{result}")
     threads = options["threads"] or n_threads()
     check, interrupted = not options["no_check"], False

@@ -265,7 +265,7 @@ class Requirements:
         dominant_coverage: Lit area / area reachable by projectors, on the target.
         min_reachable: Area reachable by projectors / target area.
         target: `dominant` regions, or the whole `surface`.
-        pattern: `rings`, or a `dense` code of every pixel; `none` comes later.
+        pattern: `rings`, a `dense` code of every pixel, or `none`: cameras alone.
         existing: Devices that stand already and are part of every plan.
         region_coverage: Floor of each dominant region: lit area / area reachable by
             projectors, and measured area / area reachable by cameras; 0: no floor.
@@ -273,6 +273,7 @@ class Requirements:
         robust: What drawn rigs must meet, where the rest is tightened for it.
         stock: Models of which there are so many and no more.
         survival: Pairs that must measure what counts, and losses to survive.
+        min_views: Cameras that must see what counts, of pattern `none`; else None.
     """
 
     max_projectors: int
@@ -293,6 +294,7 @@ class Requirements:
     robust: Robust | None = None
     stock: tuple[Stock, ...] = ()
     survival: Survival | None = None
+    min_views: int | None = None
 
     def stock_of(self, kind: str) -> dict[str, int]:
         """Return how many there are of each counted model of a kind."""
@@ -309,7 +311,7 @@ class Requirements:
         devices = [(device, _OF_ITS_OWN) for device in document["existing"]]
         tables = [
             (document["workspace"], _LEFT_OUT),
-            (document, ("existing", "robust", "stock", "survival")),
+            (document, ("existing", "robust", "stock", "survival", "min_views")),
             (document["triangulation"], ("light",)),
             (document["projector"], ("max_sample_distance_m",)),
         ]

@@ -56,11 +56,9 @@ def build_requirements(
     shares = table.requirements
     target = wishes.target or "dominant"
     _check_choice("target", target, ("dominant", "surface"))
-    _check_choice("pattern", wishes.pattern, ("rings", "dense"))
-    for name in ("max_projectors", "max_cameras"):
-        most = getattr(wishes, name)
-        if most is not None and not most >= 1:
-            raise InputError(f"{name} = {most} must be 1 or more")
+    _check_choice("pattern", wishes.pattern, ("rings", "dense", "none"))
+    _check_counts(wishes)
+    alone = wishes.pattern == "none"
     _check_positive("tau_m", tau_m)
     _check_choice("accuracy_of", wishes.accuracy_of, ("noise", "total"))
     triangulation = _limits_of(
@@ -97,7 +95,8 @@ def build_requirements(
         workspace=workspace,
         region_coverage=_share("region_coverage", wishes, shares, or_none=True),
         region_share=shares.region_share,
-        survival=_survival(wishes),
+        survival=None if alone else _survival(wishes),
+        min_views=views_alone(wishes) if alone else None,
     )
 
 
@@ -106,6 +105,9 @@ def _of_pattern(limits: TriangulationLimits, pattern: Pattern) -> TriangulationL
     if pattern == "rings":
         return replace(limits, min_angle=None, max_angle=None)
     low, high = limits.min_angle, limits.max_angle
+    if pattern == "none":
+        # Nothing is drawn, and no projector's light is counted.
+        limits = replace(limits, drawn_edges=None, light=None)
     return replace(
         limits,
         min_conditioning=0.0,
@@ -131,6 +133,41 @@ def limit_notes(limits: LimitsTable) -> tuple[str, ...]:
             f"and at 84 only 0.6 of the surface is measured"
         )
     return tuple(sentences)
+
+
+def _check_counts(wishes: Wishes) -> None:
+    """Refuse fewer devices than any plan has.
+
+    Raises:
+        InputError: It says how many there must be.
+    """
+    least = {"max_projectors": 1, "max_cameras": 1}
+    if wishes.pattern == "none":
+        least = {"max_projectors": 0, "max_cameras": 2}
+        if wishes.max_projectors:
+            raise InputError(
+                f"max_projectors = {wishes.max_projectors} with pattern 'none', which "
+                f"has no projector: leave it out, or make it 0"
+            )
+    for name, few in least.items():
+        most = getattr(wishes, name)
+        if most is not None and not most >= few:
+            raise InputError(f"{name} = {most} must be {few} or more")
+
+
+def views_alone(wishes: Wishes) -> int:
+    """Return how many cameras must see what counts where there is no projector.
+
+    Raises:
+        InputError: If it is fewer than two, or more than may be asked for.
+    """
+    views = 2 if wishes.views is None else wishes.views
+    if not 2 <= views <= MOST_VIEWS:
+        raise InputError(
+            f"views = {views} must be from 2 to {MOST_VIEWS} with pattern 'none': one "
+            f"camera alone measures nothing"
+        )
+    return views
 
 
 def _survival(wishes: Wishes) -> Survival | None:

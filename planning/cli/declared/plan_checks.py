@@ -17,8 +17,6 @@ def check_options(options: dict[str, Any]) -> None:
     if options["unit"] and options["size_mm"] is not None:
         raise click.UsageError("give --unit or --size-mm, not both")
     _check_target(options)
-    if options["pattern"] == "none":
-        raise click.UsageError("--pattern none isn't built yet: use rings or dense")
     if options["pattern"] != "rings":
         _check_without_rings(options)
 
@@ -37,6 +35,22 @@ def _check_source(options: dict[str, Any]) -> None:
         raise click.UsageError(
             "several meshes on one rig aren't built yet: give one file"
         )
+
+
+def check_projectors(options: dict[str, Any]) -> None:
+    """Refuse a plan without a number of projectors, or with one and none to count."""
+    most = options["max_projectors"]
+    if options["pattern"] == "none":
+        if most:
+            raise click.UsageError(
+                f"--max-projectors {most} with --pattern none, which has no projector: "
+                f"leave it out"
+            )
+        options["max_projectors"] = 0
+    elif most is None:
+        raise click.UsageError("Missing option '--max-projectors'.")
+    elif most < 1:
+        raise click.UsageError(f"--max-projectors {most} must be 1 or more")
 
 
 def _check_without_rings(options: dict[str, Any]) -> None:

@@ -14,7 +14,7 @@ from planning.cli.console import (
     threads_option,
 )
 
-from .plan_checks import check_options
+from .plan_checks import check_options, check_projectors
 from .survival_options import survival_options
 
 # What `plan --help` puts together; an option of none of these is told last.
@@ -89,10 +89,9 @@ class GroupedCommand(click.Command):
 )
 @click.option(
     "--max-projectors",
-    type=click.IntRange(1),
-    required=True,
+    type=click.IntRange(0),
     metavar="N",
-    help="Projectors at most.",
+    help="Projectors at most; required, but with --pattern none.",
 )
 @click.option(
     "--max-cameras",
@@ -133,7 +132,8 @@ class GroupedCommand(click.Command):
     type=click.Choice(["rings", "dense", "none"]),
     default="rings",
     show_default=True,
-    help="Rings, or a code of every pixel (see [dense] of the rig file).",
+    help="Rings, a code of every pixel (see [dense] of the rig file), or none: cameras "
+    "alone, by the texture of the object.",
 )
 @click.option(
     "--ring-axis",
@@ -251,4 +251,5 @@ def rig_command(**options: Any) -> None:  # noqa: ANN401
     from planning.cli.plan_command import plan_command
 
     check_options(options)
+    check_projectors(options)
     run(lambda: plan_command(options, sys.argv[1:]), debug=options["debug"])
