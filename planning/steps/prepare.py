@@ -155,7 +155,7 @@ def prepared(request: PlanRequest, clock: Stopwatch) -> Prepared:
         PlannedCamera("", np.eye(4), device, body=model.body, model=model.name)
         for model, device in zip(rig.camera_models, rig.optics[1], strict=True)
     )
-    if not request.evaluates:
+    if requirements.existing and not request.evaluates:
         check_existing_clearance(scene, templates, cameras)
     return Prepared(request, scene, regions, field.radius, templates, cameras)
 

@@ -44,10 +44,10 @@ def check_alone(request: PlanRequest) -> None:
             f"it is of projectors and cameras; give a mesh"
         )
     _check_devices(request)
-    if len(rig.camera_models) > 1 or any(model.count for model in rig.camera_models):
+    if len(rig.camera_models) > 1:
         raise InputError(
-            f"{_ALONE}: rig {rig.name!r} has several models of cameras, or counts "
-            f"them; cameras alone are planned of one model, of which there are enough"
+            f"{_ALONE}: rig {rig.name!r} has {len(rig.camera_models)} models of "
+            f"cameras; cameras alone are planned of one model"
         )
 
 
