@@ -72,7 +72,11 @@ class MemberRecord(Part):
 
 
 class PlanDocument(Part):
-    """A plan as it is written; metres, radians, and pixels where named."""
+    """A plan as it is written; metres, radians, and pixels where named.
+
+    Attributes:
+        assumed: What the object or its surroundings must have, and no claim shows.
+    """
 
     format: Literal["ringrig-plan"]
     version: Literal[1]
@@ -100,6 +104,7 @@ class PlanDocument(Part):
     robust: RobustRecord | None = None
     survival: SurvivalRecord | None = None
     camera_groups: tuple[tuple[str, ...], ...] = ()
+    assumed: tuple[str, ...] = ()
     cost: CostRecord
     members: tuple[MemberRecord, ...]
     reconstruction: ReconstructionRecord | None

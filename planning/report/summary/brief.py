@@ -17,7 +17,7 @@ from planning.report.tolerance.survival_lines import counted_words, losses_words
 
 from .cause_words import causes_line
 from .check_lines import error_words, unchecked
-from .device_lines import axis_name, models_line, standing, used_up
+from .device_lines import axis_name, devices_words, models_line, standing, used_up
 from .proof_lines import user_selection
 from .region_lines import worst_region
 from .robust_lines import robust_cost
@@ -73,10 +73,7 @@ def _block(label: str, text: str, most: int) -> list[str]:
 
 def _head(plan: RigPlan, short: Sequence[Shortfall]) -> Iterator[_Block]:
     document, rig = plan.document, plan.document.rig
-    devices = (
-        f"{count_words(len(plan.projectors), 'projector')} and "
-        f"{count_words(len(plan.cameras), 'camera')}"
-    )
+    devices = devices_words(plan)
     state = unchecked(plan)
     if document.truncated:
         state = f"TRUNCATED{', NOT CHECKED' * bool(state)}"
@@ -102,6 +99,8 @@ def _head(plan: RigPlan, short: Sequence[Shortfall]) -> Iterator[_Block]:
     )
     for line in warnings(plan)[:2]:
         yield "WARNING", line, 1
+    if document.assumed:
+        yield "ASSUMED", f"{'; '.join(document.assumed)}", 2
 
 
 def _target(plan: RigPlan) -> str:
@@ -154,11 +153,17 @@ def _measured(plan: RigPlan) -> Iterator[_Block]:
     sigma, limit = plan.coverage.sigma, asked.triangulation.max_sigma_m
     lit = _share(areas.lit_m2, areas.reachable_by_projectors_m2)
     seen = _share(areas.measured_m2, areas.reachable_by_cameras_m2)
-    text = (
-        f"{_share(areas.measured_m2, areas.area_m2)} of the target; of what can be, "
-        f"lit {lit} ({100 * asked.dominant_coverage:g} asked) and measured {seen} "
-        f"({100 * asked.coverage:g})"
-    )
+    text = f"{_share(areas.measured_m2, areas.area_m2)} of the target; of what can be, "
+    if plan.cameras_alone:
+        text += (
+            f"by a pair of the {asked.min_views} or more cameras that see it {seen} "
+            f"({100 * asked.coverage:g} asked)"
+        )
+    else:
+        text += (
+            f"lit {lit} ({100 * asked.dominant_coverage:g} asked) and measured {seen} "
+            f"({100 * asked.coverage:g})"
+        )
     yield "MEASURED", text, 2
     if sigma is None:
         return
@@ -180,11 +185,13 @@ def _fewest(plan: RigPlan) -> Iterator[_Block]:
     if plan.document.evaluation is not None:
         return
     proofs = plan.document.certificates
-    kinds = {"projector": proofs.projectors, "camera": proofs.cameras}
+    kinds = {"camera": proofs.cameras}
+    if proofs.projectors is not None:
+        kinds = {"projector": proofs.projectors, **kinds}
     if plan.document.survival is not None:
         yield from zip(("FEWEST", ""), counted_words(plan), (2, 2), strict=True)
         return
-    if all(_over_all(proof) for proof in kinds.values()):
+    if len(kinds) > 1 and all(_over_all(proof) for proof in kinds.values()):
         counts = [count_words(proof.count, kind) for kind, proof in kinds.items()]
         yield (
             "FEWEST",
@@ -193,7 +200,7 @@ def _fewest(plan: RigPlan) -> Iterator[_Block]:
             2,
         )
         return
-    for label, (kind, proof) in zip(("FEWEST", ""), kinds.items(), strict=True):
+    for label, (kind, proof) in zip(("FEWEST", ""), kinds.items(), strict=False):
         yield label, _proved(kind, proof, used_up(plan.document, kind)), 2
 
 

@@ -13,9 +13,18 @@ from geometry.shapes.boxes import box_gap
 from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.words import count_words
 from planning.scene.placed_bodies import bodies_of
 
 _AXES = "xyz"
+
+
+def devices_words(plan: RigPlan, between: str = " and ") -> str:
+    """Return how many devices of each kind a plan has; no projectors aren't told."""
+    cameras = count_words(len(plan.cameras), "camera")
+    if plan.cameras_alone:
+        return cameras
+    return f"{count_words(len(plan.projectors), 'projector')}{between}{cameras}"
 
 
 def device_lines(plan: RigPlan) -> list[str]:

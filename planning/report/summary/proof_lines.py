@@ -29,6 +29,15 @@ def proof_lines(plan: RigPlan) -> list[str]:
             "nothing is proved of their number",
             f"         {_regions(plan)}",
         ]
+    if proofs.projectors is None:
+        views = requirements.min_views
+        return [
+            "",
+            _proof(plan, "camera", requirements.coverage, "measure by pairs")
+            + f" ({views} or more cameras to a sample)",
+            _continuous(proofs.cameras, "position, aim and roll"),
+            f"         {_regions(plan)}",
+        ]
     poses = light_of(plan.projectors[0].device).bounded_over
     return [
         "",

@@ -37,6 +37,11 @@ from planning.scene.scene import Scene
 
 from .view_claims import view_claims
 
+# What cameras alone measure by.
+ASSUMED = (
+    "texture on all of the surface, as fine as the cameras resolve",
+    "even light of the room, under which no texture moves",
+)
 # A point must be found within so many pixels of the cameras, where those are largest.
 _TAU_PIXELS = 4.0
 
@@ -116,6 +121,7 @@ def write_view_plan(partial: ViewPlan, clock: Stopwatch) -> RigPlan:
                 reconstruction=None,
             ),
         ),
+        assumed=ASSUMED,
         reconstruction=None,
         timings_s=dict(clock.seconds),
     )

@@ -22,6 +22,11 @@ def audit_views(case: AuditCase, findings: AuditFindings) -> None:
         findings.holds(
             n == 0, f"surface.npz {name}", f"{n} poses are there, of no projector"
         )
+    findings.holds(
+        any("texture" in words for words in document.assumed),
+        "assumed",
+        "must say that texture is assumed",
+    )
     views = required.min_views
     findings.holds(
         views is not None and views >= 2,
