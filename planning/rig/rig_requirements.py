@@ -31,7 +31,9 @@ _WARN_INCIDENCE_DEG = 70.0
 # Pairs that may be asked for of each point: more are no survival but another rig.
 MOST_VIEWS = 8
 # Triangulation angles where a rig states none: errors grow as 1 / sin beyond [rad].
+# Of cameras alone images differ too much to be matched, docs/method/photogrammetry.md.
 _ANGLES = (math.radians(10.0), math.radians(90.0))
+_ANGLES_OF_VIEWS = (math.radians(10.0), math.radians(60.0))
 
 _UP_VECTORS = {
     **{"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)},
@@ -105,6 +107,7 @@ def _of_pattern(limits: TriangulationLimits, pattern: Pattern) -> TriangulationL
     if pattern == "rings":
         return replace(limits, min_angle=None, max_angle=None)
     low, high = limits.min_angle, limits.max_angle
+    least, most = _ANGLES_OF_VIEWS if pattern == "none" else _ANGLES
     if pattern == "none":
         # Nothing is drawn, and no projector's light is counted.
         limits = replace(limits, drawn_edges=None, light=None)
@@ -113,8 +116,8 @@ def _of_pattern(limits: TriangulationLimits, pattern: Pattern) -> TriangulationL
         min_conditioning=0.0,
         min_ring_pitch_px=None,
         ring_sigma_m=None,
-        min_angle=_ANGLES[0] if low is None else low,
-        max_angle=_ANGLES[1] if high is None else high,
+        min_angle=least if low is None else low,
+        max_angle=most if high is None else high,
     )
 
 

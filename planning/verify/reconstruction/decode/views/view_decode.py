@@ -1,0 +1,178 @@
+"""Images of two cameras to measured points, with no knowledge of the object."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import label
+
+from planning.verify.reconstruction.arrays import Array, Grey, Mask
+from planning.verify.reconstruction.calibration import CameraCalibration
+from planning.verify.reconstruction.cloud import Cloud
+from planning.verify.reconstruction.decode.dense.dense_decode import depth_steps
+from planning.verify.reconstruction.decode.dense.dense_limits import DenseLimits
+
+from .level_image import Grid, halved_images
+from .two_views import homogeneous
+from .window_fit import Fitted, WindowFit
+from .window_search import WindowSearch
+
+# Grey levels up to which a pixel shows nothing but noise and the dark beside the object.
+DARK = 20.0
+# Images are halved so often.
+_LEVELS = 4
+# Correlation of windows that are looked at more closely, and of those that match.
+_ABOUT, _LEAST = 0.6, 0.85
+# What a match is off beside its noise, alike whatever the noise is: windows are taken
+# for planes, and surfaces are curved; images are taken on grids [px].
+_LEAST_OFF_PX = 0.08
+# Places that hang together and are fewer are no surface.
+_FEWEST = 25
+# Why a place may give no point, in the order in which it is asked.
+VIEW_CAUSES = ("no_match", "dark", "angle", "unsure", "depth_step", "isolated")
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectImage:
+    """The part of a camera's image that holds the object.
+
+    Attributes:
+        grey: As recorded, shape (h, w).
+        corner: Pixel (u, v) of the top-left pixel.
+    """
+
+    grey: Grey
+    corner: tuple[int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class MatchedViews:
+    """What two cameras measured; indices of devices in the cloud are 0.
+
+    Attributes:
+        cloud: The points; `rays` of the first camera, `beams` of the second.
+        n_asked: Pixels of which points were sought.
+        rejected: Those that gave none, by cause.
+    """
+
+    cloud: Cloud
+    n_asked: int
+    rejected: dict[str, int]
+
+
+def match_views(
+    cameras: tuple[CameraCalibration, CameraCalibration],
+    images: tuple[ObjectImage, ObjectImage],
+    ball: tuple[Array, float],
+    limits: DenseLimits,
+    seed: tuple[int, ...],
+) -> MatchedViews:
+    """Measure what both cameras see, by windows of the first one's pixels.
+
+    Args:
+        cameras: As they are believed to stand.
+        images: What they recorded.
+        ball: Where the object is: centre in the world, shape (3,), and radius [m].
+        limits: Angles, sigma and spacing of points.
+        seed: Of the planes that the search draws.
+    """
+    first, second = cameras
+    depth = float((ball[0] - first.centre) @ first.axis)
+    depths = max(depth - ball[1], 1e-3 * depth), depth + ball[1]
+    levels = tuple(halved_images(one.grey, one.corner, _LEVELS) for one in images)
+    step = max(1, round(limits.spacing_m * first.focal_px / depth))
+    search = WindowSearch(cameras, (levels[0], levels[1]), depths, seed)
+    found = search.found(step, DARK)
+    about = np.flatnonzero(found.scores >= _ABOUT)
+    if not len(about):
+        none = {"no_match": len(found.scores)} if len(found.scores) else {}
+        return MatchedViews(Cloud.empty(), len(found.scores), none)
+    fit = WindowFit(cameras, (levels[0][0], levels[1][0]), DARK)
+    fitted = fit.fitted(found.grid.pixels[about], found.planes[about])
+    cloud = _cloud(first, second, found.grid.pixels[about], fitted)
+    return _judged(cloud, fitted, found.grid, about, first, limits)
+
+
+def _cloud(
+    first: CameraCalibration, second: CameraCalibration, pixels: Array, fitted: Fitted
+) -> Cloud:
+    """Points of all windows."""
+    local = homogeneous(first, pixels)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        z = 1.0 / fitted.planes[:, 0]
+        away = z * np.linalg.norm(local, axis=1)
+    rays = local / np.linalg.norm(local, axis=1)[:, None]
+    rays = rays @ first.world_from_device[:3, :3].T
+    points = first.centre + away[:, None] * rays
+    beams = points - second.centre
+    beams /= np.linalg.norm(beams, axis=1)[:, None]
+    n = len(pixels)
+    device = np.zeros(n, dtype=np.int16)
+    # With d = 1 / z a pixel along the epipolar line moves the point by z^2 / (du/dd).
+    per_px = away * z / np.maximum(fitted.moved, 1e-12)
+    cosine = np.clip(np.einsum("ij,ij->i", rays, beams), -1.0, 1.0)
+    return Cloud(
+        points=points,
+        rays=rays,
+        beams=beams,
+        pixels=pixels,
+        camera=device,
+        projector=device,
+        ring=np.full(n, -2, dtype=np.int16),
+        conditioning=np.sqrt(1.0 - cosine**2),
+        shift=per_px[:, None] * rays,
+        noise_px=fitted.sigma * fitted.moved,
+        blur_px=np.full(n, np.nan),
+        bias_px=np.full(n, _LEAST_OFF_PX),
+    )
+
+
+def _judged(
+    cloud: Cloud,
+    fitted: Fitted,
+    grid: Grid,
+    about: Array,
+    first: CameraCalibration,
+    limits: DenseLimits,
+) -> MatchedViews:
+    """Leave out what doesn't match, is unsure, or hangs together with nothing."""
+    cosine = np.einsum("ij,ij->i", cloud.rays, cloud.beams)
+    angle = np.arccos(np.clip(cosine, -1.0, 1.0))
+    spread = np.linalg.norm(cloud.shift, axis=1) * np.hypot(
+        cloud.noise_px, cloud.bias_px
+    )
+    with np.errstate(invalid="ignore"):
+        fails = {
+            "no_match": ~((fitted.scores >= _LEAST) & (fitted.planes[:, 0] > 0.0)),
+            "dark": ~fitted.lit,
+            "angle": ~((angle >= limits.min_angle) & (angle <= limits.max_angle)),
+            "unsure": ~(spread <= limits.max_sigma_m),
+        }
+    alone = ~np.any(list(fails.values()), axis=0)
+    depth, sigma = np.full(grid.index.shape, np.nan), np.zeros(grid.index.shape)
+    place = np.flatnonzero(grid.index.ravel() >= 0)[about]
+    away = np.linalg.norm(cloud.points - first.centre, axis=1)
+    depth.ravel()[place[alone]] = away[alone]
+    sigma.ravel()[place[alone]] = spread[alone]
+    at_step = depth_steps(depth, sigma, limits.max_slant * grid.step / first.focal_px)
+    fails["depth_step"] = at_step.ravel()[place]
+    whole = np.isfinite(depth) & ~at_step
+    fails["isolated"] = ~_hanging_together(whole).ravel()[place]
+    n_asked = int(np.count_nonzero(grid.index >= 0))
+    outcome = np.full(len(about), -1)
+    for cause in reversed(fails):
+        outcome[fails[cause]] = VIEW_CAUSES.index(cause)
+    rejected = {
+        cause: int(np.count_nonzero(outcome == k))
+        for k, cause in enumerate(VIEW_CAUSES)
+    }
+    rejected["no_match"] += n_asked - len(about)
+    return MatchedViews(cloud.take(outcome < 0), n_asked, rejected)
+
+
+def _hanging_together(whole: Mask) -> Mask:
+    """Places of pieces that are large enough."""
+    pieces = np.zeros(whole.shape, dtype=np.int64)
+    label(whole, output=pieces)
+    size = np.bincount(pieces.ravel(), minlength=1)
+    size[0] = 0
+    return size[pieces] >= _FEWEST
