@@ -40,7 +40,10 @@ def best_pairs(
     least, terms = np.full(n, np.inf), dict[ViewTerm, _Array]()
     for pair in view_pairs(scene, sightings, len(cameras)):
         total = np.where(pair.measured, pair.quality.total, np.inf)
-        better = np.flatnonzero(total < least[pair.samples])
+        # A sample may stand there with several of the cameras before.
+        order = np.lexsort((total, pair.samples))
+        first = order[np.flatnonzero(np.diff(pair.samples[order], prepend=-1))]
+        better = first[total[first] < least[pair.samples[first]]]
         rows = pair.samples[better]
         least[rows] = total[better]
         for name, term in pair.quality.terms.items():
