@@ -104,6 +104,19 @@ class TwoViews:
         return u, v, slope_u, slope_v
 
 
+def plane_normals(camera: CameraCalibration, pixels: Array, planes: Array) -> Array:
+    """Return unit normals in the world of planes seen at pixels, off the camera, (n, 3).
+
+    With a plane N.X = c the inverse depth is N.(x, 1) / c.
+    """
+    local = homogeneous(camera, pixels)
+    slopes = planes[:, 1:] * np.diag(camera.matrix)[:2]
+    along = planes[:, 0] - np.einsum("ij,ij->i", local[:, :2], slopes)
+    normals = np.column_stack([slopes, along])
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    return normals @ camera.world_from_device[:3, :3].T
+
+
 def homogeneous(camera: CameraCalibration, pixels: Array) -> Array:
     """Return rays of pixels (n, 2) in the camera's frame, of depth 1, (n, 3)."""
     rays = camera.rays(pixels) @ camera.world_from_device[:3, :3]

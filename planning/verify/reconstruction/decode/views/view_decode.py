@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import label
+from scipy.ndimage import binary_erosion, label
 
 from planning.verify.reconstruction.arrays import Array, Grey, Mask
 from planning.verify.reconstruction.calibration import CameraCalibration
@@ -12,8 +12,8 @@ from planning.verify.reconstruction.decode.dense.dense_decode import depth_steps
 from planning.verify.reconstruction.decode.dense.dense_limits import DenseLimits
 
 from .level_image import Grid, halved_images
-from .two_views import homogeneous
-from .window_fit import Fitted, WindowFit
+from .two_views import homogeneous, plane_normals
+from .window_fit import REACH_PX, Fitted, WindowFit
 from .window_search import WindowSearch
 
 # Grey levels up to which a pixel shows nothing but noise and the dark beside the object.
@@ -25,10 +25,19 @@ _ABOUT, _LEAST = 0.6, 0.85
 # What a match is off beside its noise, alike whatever the noise is: windows are taken
 # for planes, and surfaces are curved; images are taken on grids [px].
 _LEAST_OFF_PX = 0.08
+# The largest incidence at which windows are compared [rad].
+_STEEPEST = np.deg2rad(80.0)
+# At the border of a surface matches count up to so many times the median noise.
+_VAGUE = 2.0
+# Neighbours on its plane that a place has in a surface.
+_LEAST_NEIGHBOURS, _SIGMAS = 2, 5.0
 # Places that hang together and are fewer are no surface.
 _FEWEST = 25
 # Why a place may give no point, in the order in which it is asked.
-VIEW_CAUSES = ("no_match", "dark", "angle", "unsure", "depth_step", "isolated")
+VIEW_CAUSES = (
+    *("no_match", "dark", "aslant", "angle", "unsure"),
+    *("depth_step", "alone", "isolated", "border"),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,6 +153,7 @@ def _judged(
         fails = {
             "no_match": ~((fitted.scores >= _LEAST) & (fitted.planes[:, 0] > 0.0)),
             "dark": ~fitted.lit,
+            "aslant": ~_facing(cloud, fitted, first),
             "angle": ~((angle >= limits.min_angle) & (angle <= limits.max_angle)),
             "unsure": ~(spread <= limits.max_sigma_m),
         }
@@ -155,8 +165,18 @@ def _judged(
     sigma.ravel()[place[alone]] = spread[alone]
     at_step = depth_steps(depth, sigma, limits.max_slant * grid.step / first.focal_px)
     fails["depth_step"] = at_step.ravel()[place]
-    whole = np.isfinite(depth) & ~at_step
-    fails["isolated"] = ~_hanging_together(whole).ravel()[place]
+    planes = np.full((*grid.index.shape, 3), np.nan)
+    planes.reshape(-1, 3)[place[alone]] = fitted.planes[alone]
+    lone = _neighbours(planes, sigma, grid.step, first.focal_px) < _LEAST_NEIGHBOURS
+    fails["alone"] = lone.ravel()[place]
+    whole = _hanging_together(np.isfinite(depth) & ~at_step & ~lone)
+    fails["isolated"] = ~whole.ravel()[place]
+    # What lies beside a surface may look like its border for once, but never as exactly.
+    inner = binary_erosion(whole, iterations=-(-REACH_PX // grid.step))
+    at_border = whole & ~np.asarray(inner, dtype=bool)
+    typical = np.median(cloud.noise_px[alone]) if alone.any() else 0.0
+    vague = cloud.noise_px > _VAGUE * typical
+    fails["border"] = at_border.ravel()[place] & vague
     n_asked = int(np.count_nonzero(grid.index >= 0))
     outcome = np.full(len(about), -1)
     for cause in reversed(fails):
@@ -167,6 +187,41 @@ def _judged(
     }
     rejected["no_match"] += n_asked - len(about)
     return MatchedViews(cloud.take(outcome < 0), n_asked, rejected)
+
+
+def _facing(cloud: Cloud, fitted: Fitted, first: CameraCalibration) -> Mask:
+    """Whether both cameras look at the front of a window's plane, not too steeply."""
+    normals = plane_normals(first, cloud.pixels, fitted.planes)
+    least = np.cos(_STEEPEST)
+    looks = [np.einsum("ij,ij->i", normals, r) for r in (cloud.rays, cloud.beams)]
+    return (looks[0] >= least) & (looks[1] >= least)
+
+
+def _neighbours(planes: Array, sigma: Array, step: int, focal_px: float) -> Array:
+    """Return how many of four neighbours lie on each place's plane, shape (h, w).
+
+    But for noise, and half of what is between both, for surfaces are curved.
+
+    Args:
+        planes: d, d_u, d_v of each place; NaN: unknown, shape (h, w, 3).
+        sigma: Deviation of its depth [m], shape (h, w).
+        step: Pixels between places.
+        focal_px: Of the first camera.
+    """
+    count = np.zeros(sigma.shape, dtype=np.int64)
+    for axis, slope in ((0, 2), (1, 1)):
+        for way in (1, -1):
+            there = np.roll(planes[:, :, 0], -way, axis)
+            spread = np.hypot(sigma, np.roll(sigma, -way, axis))
+            edge = [slice(None)] * 2
+            edge[axis] = slice(-1, None) if way == 1 else slice(0, 1)
+            there[tuple(edge)] = np.nan
+            with np.errstate(invalid="ignore", divide="ignore"):
+                expected = planes[:, :, 0] + way * step * planes[:, :, slope]
+                off = np.abs(1.0 / there - 1.0 / expected)
+                between = 0.5 * step / (focal_px * planes[:, :, 0])
+                count += off <= between + _SIGMAS * spread
+    return count
 
 
 def _hanging_together(whole: Mask) -> Mask:

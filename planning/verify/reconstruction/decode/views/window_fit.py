@@ -24,7 +24,7 @@ from .level_image import LevelImage, between_pixels
 from .two_views import TwoViews
 
 # Pixels of a round window.
-_REACH_PX = 5
+REACH_PX = 5
 # Steps, and those of them that needn't know the image between pixels so exactly.
 _STEPS, _ROUGH = 4, 2
 # Windows at once: they stay in the cache.
@@ -61,9 +61,9 @@ class WindowFit:
         dark: float,
     ) -> None:
         self._cameras, self._images, self._dark = cameras, images, dark
-        reach = np.arange(-_REACH_PX, _REACH_PX + 1, dtype=np.float64)
+        reach = np.arange(-REACH_PX, REACH_PX + 1, dtype=np.float64)
         square = np.stack(np.meshgrid(reach, reach), axis=-1).reshape(-1, 2)
-        self._offsets = square[np.hypot(*square.T) <= _REACH_PX + 0.5]
+        self._offsets = square[np.hypot(*square.T) <= REACH_PX + 0.5]
         grey = images[1].grey.astype(np.float64)
         self._spline = spline_filter(grey).astype(np.float32)
         by_row, by_column = np.gradient(grey)
@@ -143,7 +143,7 @@ def _scales(slope: Grey, offsets: Array) -> Array:
     """Return what columns of d, d_u, d_v are divided by, so that all are near 1."""
     size = np.sqrt(np.mean(np.square(slope, dtype=np.float64), axis=1))
     size = np.maximum(size, 1e-12)[:, None]
-    return size * np.array([1.0, _REACH_PX, _REACH_PX])
+    return size * np.array([1.0, REACH_PX, REACH_PX])
 
 
 def _normal_equations(
