@@ -116,7 +116,10 @@ class Sightings:
         precisions = rows_of(self.precision, first), rows_of(self.precision, second)
         normals = rows_of(self.normals, self.sample[first])
         x = _solved(precisions[0] + precisions[1], normals)
-        noise = np.einsum("ij,ij->i", normals, x)
+        # Rays along one line meet anywhere, and the product of infinities says nothing.
+        met = np.isfinite(x).all(axis=1)
+        along = np.einsum("ij,ij->i", normals, np.where(met[:, None], x, 0.0))
+        noise = np.where(met, along, np.inf)
         terms: dict[ViewTerm, Array] = {"matches": limits.noise_px * np.sqrt(noise)}
         cosine = np.einsum("ij,ij->i", a.rays, b.rays)
         quality = ViewPairQuality(cosine, terms["matches"], terms)

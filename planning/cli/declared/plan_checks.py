@@ -50,7 +50,9 @@ def check_projectors(options: dict[str, Any]) -> None:
     elif most is None:
         raise click.UsageError("Missing option '--max-projectors'.")
     elif most < 1:
-        raise click.UsageError(f"--max-projectors {most} must be 1 or more")
+        raise click.UsageError(
+            f"Invalid value for '--max-projectors': {most} is not in the range x>=1."
+        )
 
 
 def _check_without_rings(options: dict[str, Any]) -> None:
