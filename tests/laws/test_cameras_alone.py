@@ -1,14 +1,13 @@
 """`--pattern none` from mesh to audited plan, what it can't be asked with, and lies."""
 
 import json
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from support.little_work import work_little
 
 from geometry.shapes.primitives import sphere
 from planning import load_rig, plan_rig
+from planning.cameras.photogrammetry import view_selection
 from planning.model.errors import InputError, PlanFileError
 from planning.model.plan import RigPlan
 from planning.report.page.page import page_of
@@ -32,6 +31,12 @@ ASKED = {"max_projectors": 0, "pattern": "none", "target": "surface"}
 ASKED |= {"coverage": 0.6, "min_reachable": 0.3, "check": False, "threads": 1}
 
 
+def prove_little(patch):
+    """Let covers by pairs cost little: what is proved of them has tests of its own."""
+    for name in ("_BUDGET", "_AGAIN"):
+        patch.setattr(view_selection, name, 3e7)
+
+
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory):
     path = tmp_path_factory.mktemp("rig") / "alone.toml"
@@ -48,6 +53,7 @@ def ball():
 def plan(ball, rig):
     with pytest.MonkeyPatch.context() as patch:
         work_little(patch)
+        prove_little(patch)
         return plan_rig(ball, rig, **ASKED)
 
 
@@ -94,7 +100,8 @@ def test_what_is_written_is_what_is_read(plan, tmp_path):
 def test_words_tell_of_cameras_and_texture_alone(plan):
     for text in (brief(plan, (), ()), summary(plan, (), ())):
         assert "texture" in text
-        assert " lit " not in text.replace("is lit and", "")
+        assert " lit " not in text
+        assert "projector" not in text
     figures = camera_figures(plan, threads=1)
     best = [max(f.triangulation.values(), key=lambda a: a is not None) for f in figures]
     low, high = plan.requirements.triangulation.angles
@@ -140,7 +147,7 @@ def cleared(key, value):
             "terms_rms_m.camera",
         ),
         (scaled("cameras", 0, "seen_area_m2", by=1.3), "C1.seen_area_m2"),
-        (scaled("coverage", "uncovered_by_cause", "few_views", by=1.2), "few_views"),
+        (scaled("coverage", "uncovered_by_cause", "few_views", by=1.4), "few_views"),
         (
             told(lambda d: d["cameras"][0].update(sole_area_m2=d["cameras"][0]["seen_area_m2"])),
             "C1.sole_area_m2",
@@ -212,20 +219,25 @@ def test_what_it_cant_be_asked_with_is_refused_in_a_line(ball, rig, wish, words)
     assert "\n" not in str(refused.value)
 
 
-def test_bodies_and_standing_devices_are_refused(ball, rig):
-    body = {"size_mm": (50.0, 50.0, 50.0), "centre_mm": (0.0, 0.0, -30.0)}
-    table = rig.table.model_copy(
-        update={"camera": type(rig.table.camera).model_validate(
-            rig.table.camera.model_dump() | {"body": body}
-        )}
-    )  # fmt: skip
-    with pytest.raises(InputError, match=r"leave \[camera\.body\] out"):
-        plan_rig(ball, replace(rig, table=table), **ASKED)
+def test_bodies_and_standing_devices_are_refused(ball, tmp_path):
+    for more, words in (
+        ("[camera.body]\nsize_mm = [50, 50, 50]\ncentre_mm = [0, 0, -30]\n", r"leave \[camera\.body\] out"),
+        (
+            '[[existing]]\nkind = "camera"\nname = "old"\n'
+            "position_mm = [1100, 0, 0]\naim_mm = [0, 0, 0]\n",
+            "old stand already",
+        ),
+    ):
+        path = tmp_path / "more.toml"
+        path.write_text(RIG + more)
+        with pytest.raises(InputError, match=words):
+            plan_rig(ball, load_rig(str(path)), **ASKED)
 
 
 def test_more_views_take_no_fewer_cameras(ball, rig, plan):
     with pytest.MonkeyPatch.context() as patch:
         work_little(patch)
+        prove_little(patch)
         thrice = plan_rig(ball, rig, **(ASKED | {"views": 3}))
     assert len(thrice.cameras) >= len(plan.cameras)
     assert audit_plan(thrice, threads=1).failures == ()

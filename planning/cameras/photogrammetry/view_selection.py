@@ -23,8 +23,8 @@ from .view_pairs import Sightings
 
 _Ints = NDArray[np.int64]
 _Mask = NDArray[np.bool_]
-# More than this is asked of samples where fresh ones fall short, a step each time.
-_BUDGET = 4e9
+# Counted work of a cover, and of one whose bound is known already.
+_BUDGET, _AGAIN = 2e9, 5e8
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -83,7 +83,7 @@ class PairCandidates(CandidateCover):
             count,
             warm_start=warm_start,
             seed=self.seed,
-            budget=min(budget, _BUDGET),
+            budget=min(budget, _AGAIN),
         )
         selected = best.selected
         known = warm_start is not None and self.enough(warm_start)
@@ -132,7 +132,8 @@ def select_fewest_views(
     Bounds leave floors of regions out, which only add to them. With `known`, of the
     same candidates and less to aim at, its bound stays: what is required is the same.
     """
-    solution = solve_pair_cover(cover.pairs, seed=cover.seed, budget=_BUDGET)
+    budget = _BUDGET if known is None else _AGAIN
+    solution = solve_pair_cover(cover.pairs, seed=cover.seed, budget=budget)
     smallest = _with_floors(cover, solution.selected)
     needed, bound = len(smallest), int(np.ceil(solution.lower_bound - 1e-9))
     proof = solution.proof
