@@ -3,13 +3,14 @@
 import json
 import numpy as np
 import pytest
-from support.little_work import work_little
+from support.little_work import draw_fewer, work_little
 
 from geometry.shapes.primitives import sphere
 from planning import load_rig, plan_rig
 from planning.cameras.photogrammetry import view_selection
 from planning.model.errors import InputError, PlanFileError
 from planning.model.plan import RigPlan
+from planning.proofs import camera_bound
 from planning.report.page.page import page_of
 from planning.report.summary.brief import brief
 from planning.report.summary.summary import summary
@@ -33,6 +34,8 @@ ASKED |= {"coverage": 0.6, "min_reachable": 0.3, "check": False, "threads": 1}
 
 def prove_little(patch):
     """Let covers by pairs cost little: what is proved of them has tests of its own."""
+    draw_fewer(patch, cameras=600)
+    patch.setattr(camera_bound, "DEFAULT", camera_bound.ROUGH)
     for name in ("_BUDGET", "_AGAIN"):
         patch.setattr(view_selection, name, 3e7)
 

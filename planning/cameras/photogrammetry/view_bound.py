@@ -40,15 +40,15 @@ def bound_views(
     proof, target, measured = stage.certificate, stage.target, stage.cover
     if proof.given:
         return stage
-    n = len(target)
-    reached = measured.covered(np.arange(measured.covers.shape[1]))
+    n = min(len(target), effort.most_samples or len(target))
+    reached = measured.covered(np.arange(measured.covers.shape[1]))[:n]
     spare = views_of(scene.requirements) - 1
     question = BoundQuestion.about(
         proof,
         reached,
         np.zeros(n, dtype=bool),
         scene.requirements.coverage,
-        target.samples.weight * n,
+        target.samples.weight * len(target),
         RegionFloors.none(n),
     )
     question = replace(question, count=max(1, question.count - spare))

@@ -94,7 +94,8 @@ def reconstruct_views(
                 found.append((pair, matched))
             if progress is not None:
                 progress(len(found), len(pairs))
-    everything = Cloud.join([_of_cameras(gave.cloud, *pair) for pair, gave in found])
+    clouds = [_of_cameras(gave.cloud, *pair) for pair, gave in found]
+    everything = Cloud.join([Cloud.empty(), *clouds])
     with spent.on("merge"):
         merged = merge_views(everything, plan)
     counts = tuple(_count(plan, pair, gave) for pair, gave in found)

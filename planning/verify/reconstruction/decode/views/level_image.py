@@ -25,9 +25,7 @@ class LevelImage:
         """Return the image of half as many rows and columns."""
         rows, columns = (n // 2 for n in self.grey.shape)
         quarters = self.grey[: 2 * rows, : 2 * columns].reshape(rows, 2, columns, 2)
-        return LevelImage(
-            quarters.mean(axis=(1, 3)), 0.5 * self.corner - 0.25, 2 * self.fold
-        )
+        return LevelImage(quarters.mean(axis=(1, 3)), 0.5 * self.corner, 2 * self.fold)
 
     def places(self, u: Array, v: Array) -> tuple[Array, Array]:
         """Return row and column of pixels of the camera."""

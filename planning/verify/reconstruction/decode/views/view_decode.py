@@ -1,6 +1,6 @@
 """Images of two cameras to measured points, with no knowledge of the object."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import binary_erosion, label
@@ -25,14 +25,18 @@ _ABOUT, _LEAST = 0.6, 0.85
 # What a match is off beside its noise, alike whatever the noise is: windows are taken
 # for planes, and surfaces are curved; images are taken on grids [px].
 _LEAST_OFF_PX = 0.08
+# Neighbours so far off tell how a surface bends [px].
+_FAR_PX = 6.0
 # The largest incidence at which windows are compared [rad].
 _STEEPEST = np.deg2rad(80.0)
 # At the border of a surface matches count up to so many times the median noise.
 _VAGUE = 2.0
 # Neighbours on its plane that a place has in a surface.
 _LEAST_NEIGHBOURS, _SIGMAS = 2, 5.0
-# Places that hang together and are fewer are no surface.
-_FEWEST = 25
+# So far off stand neighbours: nearer ones share most of their windows [px].
+_APART_PX = 3.0
+# What hangs together on fewer pixels is no surface.
+_FEWEST_PX = 225
 # Why a place may give no point, in the order in which it is asked.
 VIEW_CAUSES = (
     *("no_match", "dark", "aslant", "angle", "unsure"),
@@ -98,7 +102,7 @@ def match_views(
     fit = WindowFit(cameras, (levels[0][0], levels[1][0]), DARK)
     fitted = fit.fitted(found.grid.pixels[about], found.planes[about])
     cloud = _cloud(first, second, found.grid.pixels[about], fitted)
-    return _judged(cloud, fitted, found.grid, about, first, limits)
+    return _judged(cloud, fitted, found.grid, about, cameras, limits)
 
 
 def _cloud(
@@ -112,8 +116,7 @@ def _cloud(
     rays = local / np.linalg.norm(local, axis=1)[:, None]
     rays = rays @ first.world_from_device[:3, :3].T
     points = first.centre + away[:, None] * rays
-    beams = points - second.centre
-    beams /= np.linalg.norm(beams, axis=1)[:, None]
+    beams = _towards(second, points)
     n = len(pixels)
     device = np.zeros(n, dtype=np.int16)
     # With d = 1 / z a pixel along the epipolar line moves the point by z^2 / (du/dd).
@@ -140,10 +143,11 @@ def _judged(
     fitted: Fitted,
     grid: Grid,
     about: Array,
-    first: CameraCalibration,
+    cameras: tuple[CameraCalibration, CameraCalibration],
     limits: DenseLimits,
 ) -> MatchedViews:
     """Leave out what doesn't match, is unsure, or hangs together with nothing."""
+    first, second = cameras
     cosine = np.einsum("ij,ij->i", cloud.rays, cloud.beams)
     angle = np.arccos(np.clip(cosine, -1.0, 1.0))
     spread = np.linalg.norm(cloud.shift, axis=1) * np.hypot(
@@ -169,7 +173,8 @@ def _judged(
     planes.reshape(-1, 3)[place[alone]] = fitted.planes[alone]
     lone = _neighbours(planes, sigma, grid.step, first.focal_px) < _LEAST_NEIGHBOURS
     fails["alone"] = lone.ravel()[place]
-    whole = _hanging_together(np.isfinite(depth) & ~at_step & ~lone)
+    whole = np.isfinite(depth) & ~at_step & ~lone
+    whole = _hanging_together(whole, _FEWEST_PX // grid.step**2)
     fails["isolated"] = ~whole.ravel()[place]
     # What lies beside a surface may look like its border for once, but never as exactly.
     inner = binary_erosion(whole, iterations=-(-REACH_PX // grid.step))
@@ -186,7 +191,36 @@ def _judged(
         for k, cause in enumerate(VIEW_CAUSES)
     }
     rejected["no_match"] += n_asked - len(about)
+    bent = _bending(planes, grid.step).ravel()[place]
+    known = np.isfinite(bent)
+    factor = np.where(known, fitted.planes[:, 0] / (fitted.planes[:, 0] - bent), 1.0)
+    points = first.centre + factor[:, None] * (cloud.points - first.centre)
+    cloud = replace(cloud, points=points, beams=_towards(second, points))
     return MatchedViews(cloud.take(outcome < 0), n_asked, rejected)
+
+
+def _bending(planes: Array, step: int) -> Array:
+    """Return how far surfaces lie off their windows' planes in d, NaN unknown, (h, w).
+
+    Of a quadric the plane of a round window of radius R is off in its middle by
+    (d_uu + d_vv) R^2 / 8, and neighbours' slopes tell both second derivatives.
+    """
+    bent = np.full((2, *planes.shape[:2]), np.nan)
+    far = max(1, round(_FAR_PX / step))
+    for k, (axis, slope) in enumerate(((0, 2), (1, 1))):
+        d = planes[:, :, slope]
+        ahead, behind = (np.roll(d, way * far, axis) for way in (-1, 1))
+        bent[k] = (ahead - behind) / (2.0 * far * step)
+        edge = [slice(None)] * 2
+        for part in (slice(0, far), slice(-far, None)):
+            edge[axis] = part
+            bent[(k, *edge)] = np.nan
+    return bent.sum(axis=0) * (REACH_PX + 0.5) ** 2 / 8.0
+
+
+def _towards(camera: CameraCalibration, points: Array) -> Array:
+    beams = points - camera.centre
+    return beams / np.linalg.norm(beams, axis=1)[:, None]
 
 
 def _facing(cloud: Cloud, fitted: Fitted, first: CameraCalibration) -> Mask:
@@ -209,25 +243,26 @@ def _neighbours(planes: Array, sigma: Array, step: int, focal_px: float) -> Arra
         focal_px: Of the first camera.
     """
     count = np.zeros(sigma.shape, dtype=np.int64)
+    far = max(1, round(_APART_PX / step))
     for axis, slope in ((0, 2), (1, 1)):
-        for way in (1, -1):
+        for way in (far, -far):
             there = np.roll(planes[:, :, 0], -way, axis)
             spread = np.hypot(sigma, np.roll(sigma, -way, axis))
             edge = [slice(None)] * 2
-            edge[axis] = slice(-1, None) if way == 1 else slice(0, 1)
+            edge[axis] = slice(-far, None) if way > 0 else slice(0, far)
             there[tuple(edge)] = np.nan
             with np.errstate(invalid="ignore", divide="ignore"):
                 expected = planes[:, :, 0] + way * step * planes[:, :, slope]
                 off = np.abs(1.0 / there - 1.0 / expected)
-                between = 0.5 * step / (focal_px * planes[:, :, 0])
+                between = 0.5 * far * step / (focal_px * planes[:, :, 0])
                 count += off <= between + _SIGMAS * spread
     return count
 
 
-def _hanging_together(whole: Mask) -> Mask:
-    """Places of pieces that are large enough."""
+def _hanging_together(whole: Mask, fewest: int) -> Mask:
+    """Places of pieces of so many or more."""
     pieces = np.zeros(whole.shape, dtype=np.int64)
     label(whole, output=pieces)
     size = np.bincount(pieces.ravel(), minlength=1)
     size[0] = 0
-    return size[pieces] >= _FEWEST
+    return whole & (size[pieces] >= fewest)
