@@ -17,7 +17,6 @@ from planning.model.progress import TIME_IS_UP, Report, Stopwatch
 from planning.report.assemble import write_plan
 from planning.report.live_bar import shown
 from planning.report.partial_plan import PartialPlan, PlanRequest
-from planning.report.summary.shortfall import shortfalls
 from planning.report.tolerance.robust import robustly
 from planning.rig.devices.lens_fit import check_fields
 from planning.rig.mounted import Mounted
@@ -29,7 +28,9 @@ from planning.verify.verification import Verification, verify_plan
 
 from .steps.cameras_alone.refusals import check_alone
 from .steps.cameras_alone.stages import plan_alone
-from .steps.checked import with_check
+from .steps.carried import check_carried, devices_of_heads, pattern_of_rig
+from .steps.checked import axes_may_help, missed_by, with_check
+from .steps.heads import planned_heads
 from .steps.prepare import prepared, request_of, standing_devices
 from .steps.stages import (
     bounded_cameras,
@@ -46,6 +47,7 @@ from .steps.surviving import (
     one_more_for_losses,
     placed_to_survive,
 )
+from .steps.turntable import planned_on_turntable
 
 Keep = Callable[[RigPlan], None]
 Checked = Callable[[RigPlan, Verification], None]
@@ -57,8 +59,9 @@ def plan_rig(
     mesh: TriangleMesh | Sequence[TriangleMesh] | RangedBody,
     rig: Rig,
     *,
-    max_projectors: int | None,
+    max_projectors: int | None = None,
     max_cameras: int | None = None,
+    max_heads: int | None = None,
     target: TargetName | None = None,
     select: Select | None = None,
     weight: Weight | None = None,
@@ -73,7 +76,7 @@ def plan_rig(
     robust: float | None = None,
     views: int | None = None,
     survive: int = 0,
-    pattern: Pattern = "rings",
+    pattern: Pattern | None = None,
     seed: int = 0,
     threads: int | None = None,
     check: bool = True,
@@ -93,11 +96,12 @@ def plan_rig(
         mesh: The surface, in metres; one for now. Or the body that `read_ranges` found:
             then limits are tightened by what isn't known of it.
         rig: Devices and limits, from `load_rig`.
-        max_projectors: Projectors at most; None: the fixed devices and those of the rig
-            file are evaluated as they stand. None is sought or moved, nothing is proved
-            of their number, and limits of the workspace that they break are told and
-            refuse nothing. 0 with the pattern `none`.
+        max_projectors: Projectors at most; None, and no heads either: the fixed devices
+            and those of the rig file are evaluated as they stand. None is sought or
+            moved, nothing is proved of their number, and limits of the workspace that
+            they break are told and refuse nothing. 0 with the pattern `none`.
         max_cameras: Cameras at most; None: as many as the coverage needs.
+        max_heads: Instead, of a rig with a `[head]`: heads at most, or its stations.
         target: The `dominant` regions, or the whole `surface`; None: the former, and
             the latter of a body known by its ranges.
         select: Faces that are the target instead of the dominant regions: one bool a
@@ -120,8 +124,9 @@ def plan_rig(
             which some pair measures it; None: two.
         survive: Devices, 0 or 1, of which any may be lost: what is left still meets
             the requirements.
-        pattern: What projectors show: `rings`, or a `dense` code of every pixel; `none`:
-            there is no projector, and pairs of cameras measure by the object's texture.
+        pattern: What projectors show: `rings`, or a `dense` code of every pixel; None:
+            that, where the rig has a head or a turntable; `none`: there is no
+            projector, and pairs of cameras measure by the object's texture.
         seed: The same seed gives the same plan.
         threads: Worker threads; no result depends on it. None: one for each core.
         check: Whether the plan is audited and reconstructed from pixels.
@@ -149,12 +154,15 @@ def plan_rig(
         TimeLimitError: If the time limit came before any plan.
     """
     rig = rig if fixed is None else fixed.on(rig)
-    evaluates = max_projectors is None
-    if max_projectors is None:
+    evaluates = max_projectors is None and max_heads is None
+    if max_heads is not None:
+        max_projectors, max_cameras = devices_of_heads(rig, max_heads)
+    elif max_projectors is None:
         max_projectors, max_cameras = standing_devices(rig)
     wishes = Wishes(
         max_projectors=max_projectors,
         max_cameras=max_cameras,
+        max_heads=max_heads,
         target=target,
         dominant_coverage=dominant_coverage,
         coverage=coverage,
@@ -167,7 +175,7 @@ def plan_rig(
         robust=robust,
         views=views,
         survive=survive,
-        pattern=pattern,
+        pattern=pattern_of_rig(rig, pattern),
     )
     # BLAS must not split sums differently with another number of threads.
     with (
@@ -185,8 +193,9 @@ def plan_rig(
             mounted=fixed,
             evaluates=evaluates,
         )
+        check_carried(request)
         check_survival(request)
-        if pattern == "none":
+        if wishes.pattern == "none":
             check_alone(request)
             planned = _alone
         else:
@@ -205,24 +214,6 @@ def plan_rig(
     if missed and on_miss == "raise":
         raise RequirementError(plan, missed)
     return plan
-
-
-def axes_may_help(plan: RigPlan, partial: PartialPlan) -> bool:
-    """Whether only the check isn't passed, and centred ring axes weren't asked for."""
-    if partial.axes == "free" or partial.request.ring_axis != "auto":
-        return False
-    check, alone = plan.document.reconstruction, {"reconstruction": None}
-    if check is None or check.passed:
-        return False
-    return not shortfalls(RigPlan(plan.document.changed(**alone), plan.surface))
-
-
-def missed_by(plan: RigPlan, *, check: bool) -> tuple[str, ...]:
-    """Return what of the requirements a plan misses, and the check if it was wanted."""
-    missed = shortfalls(plan)
-    if check and plan.document.reconstruction is None:
-        missed += ("the check wasn't made: the time limit came first",)
-    return missed
 
 
 def _alone(
@@ -252,6 +243,10 @@ def _planned(
         InterruptedPlanError: If planning is interrupted; it carries the best plan.
         TimeLimitError: If the time limit came before any plan was written.
     """
+    if request.wishes.max_heads is not None:
+        return planned_heads(request, clock)
+    if request.rig.turntable is not None:
+        return planned_on_turntable(request, clock)
     partial = larger = begun = _first_plan(request, clock)
     first = None
     try:

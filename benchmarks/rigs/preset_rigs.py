@@ -75,7 +75,8 @@ def main(names: list[str]) -> None:
     )
     print("|---|---|---|---|---|---|---|---|---|")
     for preset in list_presets():
-        if preset.name in (names or preset_names()):
+        # Heads have a table of their own, `benchmarks.plans.heads`.
+        if preset.name in (names or preset_names()) and "head" not in preset.devices:
             print(row(preset.name, preset.description), flush=True)
 
 

@@ -11,7 +11,7 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.parallel import n_threads
 from planning.model.plan import InterruptedPlanError, RequirementError
 from planning.model.progress import Report, Stopwatch
-from planning.pipeline import missed_by, plan_rig
+from planning.pipeline import plan_rig
 from planning.report.entries.range_entries import ranges_lines
 from planning.report.summary.brief import brief
 from planning.report.summary.summary import summary
@@ -19,6 +19,7 @@ from planning.rig.mounted import Mounted, read_mounted, split_fixed
 from planning.rig.rig import Rig, load_rig
 from planning.scene.interest import Interest, read_selection, read_weight
 from planning.scene.ranges.ranged_body import RangedBody, read_ranges
+from planning.steps.checked import missed_by
 
 from .console import print_json, progress, writable
 from .lines.object_lines import optics_lines, size_lines
@@ -28,6 +29,7 @@ from .saved_plans import SavedPlans
 _ASKED = (
     "max_projectors",
     "max_cameras",
+    "max_heads",
     "target",
     "dominant_coverage",
     "coverage",
@@ -55,7 +57,8 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
     limit = None if limit is None else _OURS * limit
     clock = Stopwatch(time_limit=limit, begin=begin)
     path = Path(options["ranges"] or options["meshes"][0])
-    result = "evaluation" if options["max_projectors"] is None else "plan"
+    evaluates = options["max_projectors"] is None and options["max_heads"] is None
+    result = "evaluation" if evaluates else "plan"
     folder = options["output"] or Path(f"{path.name.split('.')[0]}-{result}")
     threads = options["threads"] or n_threads()
     check, interrupted = not options["no_check"], False

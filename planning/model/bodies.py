@@ -1,4 +1,4 @@
-"""Housings and mounts, which move with a device; zones, where devices may stand.
+"""Housings and mounts, which move with a device; zones and obstacles, which don't.
 
 Only values, as rig files and plans hold them; what follows from them the planner
 (`placed_bodies`, `mount_settings`, `admissible`) and the checkers each work out alone.
@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from geometry.arrays import Array
+from geometry.mesh.mesh import TriangleMesh
 
 from .table_types import Axis, Positive, Sides, Table
 
@@ -228,3 +229,16 @@ class Existing:
                 raise ValueError("existing: poses must be 4 x 4")
         if (self.world_from_ring is None) != (not self.ring_radii):
             raise ValueError("existing: world_from_ring and ring_radii go together")
+
+
+@dataclass(frozen=True, eq=False)
+class Obstacle:
+    """A surface through which no light and no view passes: robot, table, clamp.
+
+    Attributes:
+        name: As in the rig file.
+        mesh: Where it stands, in the world [m].
+    """
+
+    name: str
+    mesh: TriangleMesh

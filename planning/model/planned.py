@@ -31,6 +31,7 @@ class PlannedProjector:
         exposure_s: What cameras expose each of its frames for [s]; None: not planned.
         model: Which of the rig's models it is; empty where there is one.
         code: What a `dense` pattern codes its pixels by.
+        station: Where it stands with those that it measures with, see `meet`.
     """
 
     id: str
@@ -46,6 +47,16 @@ class PlannedProjector:
     exposure_s: float | None = None
     model: str = ""
     code: DenseCode | None = None
+    station: str = ""
+
+
+def meet(station: str, other: str) -> bool:
+    """Return whether devices at two stations make a pair.
+
+    They do at one station (a pose of a sensor head, a step of a turntable), and where
+    either belongs to none.
+    """
+    return station == other or not (station and other)
 
 
 def code_bits(n_rings: int) -> int:
@@ -87,6 +98,7 @@ class PlannedCamera:
         existing: Name of the device that stands already; empty: it is planned.
         body: Its housing; None: it takes no room.
         model: Which of the rig's models it is; empty where there is one.
+        station: As of projectors.
     """
 
     id: str
@@ -95,3 +107,4 @@ class PlannedCamera:
     existing: str = ""
     body: Body | None = None
     model: str = ""
+    station: str = ""

@@ -19,9 +19,9 @@ from geometry.files.file_content import file_content
 from geometry.mesh.mesh import MeshError, TriangleMesh
 from geometry.mesh.topology import numbered
 
+from .bodies import Obstacle
 from .errors import PlanFileError
 from .files import reading
-from .obstacles import Obstacle
 
 # Kinds of numbers and the shape of each array; any number n.
 _ARRAYS: dict[str, tuple[str, tuple[int | str, ...]]] = {

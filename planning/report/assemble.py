@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from planning.cameras.baselines.baseline_rows import baseline_rows
 from planning.cameras.baselines.seams import SampledSurface, overlap_components
+from planning.model.bodies import Obstacle
 from planning.model.document.certificates import Certificates
 from planning.model.document.device_records import BaselineRow
 from planning.model.document.input_records import (
@@ -23,7 +24,6 @@ from planning.model.document.plan_document import (
     MemberRecord,
     PlanDocument,
 )
-from planning.model.obstacles import Obstacle
 from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
@@ -36,6 +36,7 @@ from planning.report.advice.what_helps import with_fewer_needed, with_relaxation
 from planning.report.entries.cost_entry import cost_record
 from planning.report.entries.overlaps import overlap_records
 from planning.report.entries.range_entries import ranges_record, with_spread
+from planning.report.entries.station_entries import stations_record
 from planning.report.entries.survival_entries import survival_record
 from planning.report.entries.violations import violations
 from planning.rings.ring_pitch import widest_gap
@@ -68,7 +69,7 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
     among = scene.among((*devices.projectors, *devices.cameras))
     coverage, certificates = claims.coverage, _certificates(partial)
     regions = entries.region_records(scene.mesh, partial.ready.regions, claims)
-    if not partial.truncated:
+    if not partial.truncated and partial.stationed is None:
         coverage = with_relaxations(partial, devices, claims, clock)
         regions = with_floor_relaxations(
             regions, claims.region_samples, partial.request.rig, devices
@@ -76,7 +77,9 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
         if not partial.request.evaluates:
             regions = with_small_floor(regions, partial.stage.candidates)
         certificates = with_fewer_needed(certificates, partial, clock)
-    overlaps, schedule = overlap_records(among, devices.projectors)
+    stationed = partial.stationed
+    moved = stationed is not None and stationed.record.kind != "heads"
+    overlaps, schedule = overlap_records(among, devices.projectors, moved=moved)
     surface = _surface(scene, devices, partial.ready)
     requirements = _final_requirements(among, claims, devices)
     projectors = entries.projector_records(among, devices, partial.rings, claims)
@@ -126,6 +129,9 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
         reconstruction=None,
         timings_s=dict(clock.seconds),
     )
+    if stationed is not None:
+        stations = stations_record(stationed, devices)
+        document = document.changed(stations=stations)
     if survival is not None:
         document = document.changed(survival=survival)
     if partial.request.ranges is not None:

@@ -67,7 +67,9 @@ class Judged:
         )
         # Another camera needn't stand among those that were chosen.
         among = scene.among(devices.projectors)
-        able[others] = measured_by_any(among, devices.reference_cameras, lit)
+        able[others] = measured_by_any(
+            among, devices.reference_cameras, lit, devices.reference_projectors
+        )
         return cls(target, first, measured, furthest, able)
 
     @cached_property

@@ -11,6 +11,7 @@ from planning.model.document.ring_records import AxisTaken, RingAxis
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.projectors.projector_stage import ProjectorStage
 from planning.proofs.surviving_counts import SurvivingCount
+from planning.report.entries.station_entries import Stationed
 from planning.rig.mounted import Mounted
 from planning.rig.range_guard import Guard
 from planning.rig.rig import Rig
@@ -91,6 +92,7 @@ class PartialPlan:
     `projectors` have evenly spaced rings about `axes`; `rings` holds those that cameras
     let finer. `other_axes` are the projectors with other axes, to compare. `surviving`
     says what survival takes of projectors and cameras; None: it isn't asked for.
+    `stationed` are the heads or steps that the devices belong to; None: to none.
     """
 
     ready: Prepared
@@ -103,6 +105,7 @@ class PartialPlan:
     rings: RingStage | None = None
     other_axes: tuple[PlannedProjector, ...] = ()
     surviving: tuple[SurvivingCount, SurvivingCount] | None = None
+    stationed: Stationed | None = None
 
     @property
     def request(self) -> PlanRequest:

@@ -1,6 +1,6 @@
 """What poses reach of samples, one pose after another on what is still missing."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,14 +39,29 @@ def furthest_lit(
 
 
 def measured_by_any(
-    scene: Scene, cameras: Iterable[PlannedCamera], samples: LitSamples
+    scene: Scene,
+    cameras: Iterable[PlannedCamera],
+    samples: LitSamples,
+    lights: Sequence[PlannedProjector] = (),
 ) -> NDArray[np.bool_]:
-    """Return which lit samples any of the cameras measures, shape (n,)."""
+    """Return which lit samples any of the cameras measures, shape (n,).
+
+    Those at a station measure with the lights there, the others with what the samples
+    are lit by.
+    """
     measured = np.zeros(len(samples.target), dtype=bool)
     for camera in cameras:
         pending = np.flatnonzero(~measured)
         if not len(pending):
             break
-        others = taken(samples, pending, samples.lit)
+        if camera.station:
+            here = [p for p in lights if p.station == camera.station]
+            target = samples.target.take(pending)
+            lit = lighting.lit_stages(scene, here, target) == LIT
+            bright = np.flatnonzero(lit.any(axis=1))
+            pending = pending[bright]
+            others = LitSamples.of(here, target.take(bright), lit[bright])
+        else:
+            others = taken(samples, pending, samples.lit)
         measured[pending] = measured_by(scene, [camera], others)[:, 0]
     return measured

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh.mesh import TriangleMesh
+from planning.model.bodies import Obstacle
+from planning.model.document.head_records import carried_records
 from planning.model.errors import InfeasibleLimitsError, RigError
-from planning.model.obstacles import Obstacle
 from planning.model.requirements import Requirements, Workspace
 from planning.scene.lights import light_of
 
@@ -30,12 +31,13 @@ from .devices.rig_devices import (
     drawn_edges,
     light_budget,
 )
+from .devices.rig_heads import head_faults, head_notes, model_faults
 from .devices.rig_models import Light, RigDevices, pinhole_of
 from .object_size import ObjectSize
 from .obstacle_tables import obstacles_of
-from .pattern_tables import DenseTable, RingsTable
 from .rig_requirements import build_requirements, build_workspace, limit_notes
 from .rig_tables import MountingTable
+from .tables.pattern_tables import DenseTable, RingsTable
 from .toml.rig_files import changed, read_rig, rig_folder
 from .wishes import Wishes
 
@@ -149,6 +151,8 @@ class Rig(RigDevices):
         for lamp, eye in product(lamps, eyes):
             drawn = drawn_edges(lamp.table, lamp.device)
             notes += edge_notes(drawn, lamp.device, pinhole_of(eye), self.standoff_m)
+        if self.head is not None:
+            notes += head_notes(self.head, self.optics_of)
         return (*limit_notes(self.table.limits), *notes)
 
     def requirements(
@@ -234,6 +238,8 @@ class Rig(RigDevices):
             listed["photometry"] = table.photometry.model_dump(exclude_none=True)
         if table.placement.clearance_mm:
             listed["clearance_m"] = table.placement.clearance_mm * 1e-3
+        for key, value in carried_records(self.head, self.turntable, self.stations):
+            listed[key] = value
         for kind in ("projector", "camera"):
             if more := self.models(kind)[1:]:
                 listed[f"more_{kind}s"] = [self._document_of(model) for model in more]
@@ -273,11 +279,18 @@ class Rig(RigDevices):
 
 def _check_devices(rig: Rig) -> None:
     """Refuse a rig whose devices can't be sharp at the standoff."""
+    faults = model_faults(rig.table, rig.models)
+    if not faults and rig.head is not None:
+        faults = [*head_faults(rig.head, rig.optics_of)]
+    if faults:
+        raise RigError("\n".join(f"rig {rig.name}: {fault}" for fault in faults))
     models = (*rig.projector_models, *rig.camera_models)
+    # The standoff of a head counts from its origin, and its volume is looked at above.
     blurred = [
         f"rig {rig.name}: {unsharp(rig.fit(model, ObjectSize.ball(0.0)))}"
         for model in models
-        if not model.device.range_m[0] <= rig.standoff_m <= model.device.range_m[1]
+        if rig.head is None
+        and not model.device.range_m[0] <= rig.standoff_m <= model.device.range_m[1]
     ]
     if blurred:
         raise InfeasibleLimitsError("\n".join(blurred))

@@ -33,11 +33,14 @@ from planning.model.table_types import (
 
 from .existing_tables import ExistingTable
 from .obstacle_tables import ObstacleTable
-from .pattern_tables import DenseTable, RingsTable
+from .tables.carrier_tables import StationsTable, TurntableTable
+from .tables.head_tables import HeadTable
+from .tables.pattern_tables import DenseTable, RingsTable
+from .tables.placement_table import PlacementTable
 from .workspace_tables import WorkspaceTable, check_names
 
-# Far beyond any device, and any table of poses and samples that memory holds.
-MOST_PIXELS, MOST_POSES = 100_000, 100_000
+# Far beyond any device.
+MOST_PIXELS = 100_000
 MOST_DEVICES, MOST_MODELS = 1_000, 20
 Resolution = Annotated[
     list[Annotated[int, Field(ge=2, le=MOST_PIXELS)]],
@@ -136,27 +139,6 @@ def _check_rising(bounds: list[float] | None) -> None:
         raise ValueError(
             f"range_mm = {bounds} must rise: nearest distance first, farthest second"
         )
-
-
-class PlacementTable(Table):
-    """Where devices may stand and how many poses are tried, `[placement]`."""
-
-    standoff_mm: Positive = 1000.0
-    standoff_play_mm: Annotated[float, Field(ge=0.0)] = 50.0
-    clearance_mm: Annotated[float, Field(ge=0.0)] = 0.0
-    n_candidate_projectors: Annotated[int, Field(ge=1, le=MOST_POSES)] = 640
-    n_candidate_cameras: Annotated[int, Field(ge=1, le=MOST_POSES)] = 480
-    n_reference_projectors: Annotated[int, Field(ge=600, le=MOST_POSES)] = 640
-    n_reference_cameras: Annotated[int, Field(ge=400, le=MOST_POSES)] = 480
-
-    @model_validator(mode="after")
-    def _check_play(self) -> Self:
-        if not self.standoff_play_mm < self.standoff_mm:
-            raise ValueError(
-                f"standoff_play_mm = {self.standoff_play_mm} must be less than "
-                f"standoff_mm = {self.standoff_mm}"
-            )
-        return self
 
 
 class LimitsTable(Table):
@@ -273,6 +255,9 @@ class RigTable(Table):
     photometry: PhotometryTable | None = None
     requirements: RequirementsTable = RequirementsTable()
     check: CheckTable = CheckTable()
+    head: HeadTable | None = None
+    turntable: TurntableTable | None = None
+    stations: StationsTable | None = None
     existing: list[ExistingTable] = Field(default=[])
     obstacle: list[ObstacleTable] = Field(default=[])
     more_cameras: list[CameraTable] = Field(default=[], max_length=MOST_MODELS)
@@ -285,7 +270,7 @@ class RigTable(Table):
     def _check_clearance(self) -> Self:
         devices = (self.camera, self.projector, self.parallel_projector)
         devices += (*self.more_cameras, *self.more_projectors, *self.existing)
-        devices += tuple(self.more_parallel_projectors)
+        devices += (*self.more_parallel_projectors, self.head)
         clearance = self.placement.clearance_mm
         if clearance and not any(device and device.body for device in devices):
             raise ValueError(
@@ -293,6 +278,13 @@ class RigTable(Table):
                 f"device has one; write [camera.body] or [projector.body]"
             )
         return self
+
+    @model_validator(mode="after")
+    def _place_head(self) -> Self:
+        if self.head is None:
+            return self
+        placed = self.placement.at_head(self.head.stands_mm, self.head.depths_mm)
+        return self.model_copy(update={"placement": placed})
 
     @model_validator(mode="after")
     def _check_noise(self) -> Self:

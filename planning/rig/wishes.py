@@ -18,6 +18,7 @@ class Wishes:
     dominant regions, and the whole surface of a body known by its ranges. `robust` is
     the share of drawn rigs that must meet what is asked; None: none is drawn.
     `views` pairs at least measure what counts, and any `survive` devices may be lost.
+    Sensor heads, of a rig that has them, are at most `max_heads`.
     """
 
     max_projectors: int
@@ -35,3 +36,4 @@ class Wishes:
     robust: float | None = None
     views: int | None = None
     survive: int = 0
+    max_heads: int | None = None

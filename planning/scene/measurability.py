@@ -64,7 +64,8 @@ def view(
     jacobian[seen] = turn @ device.ray_jacobian(local)
     off_centre[seen] = device.project(local) - device.camera_matrix[:2, 2]
     return ViewedSamples(
-        first, rays.rays, rays.distances, rays.facing, jacobian, off_centre
+        *(first, rays.rays, rays.distances, rays.facing, jacobian, off_centre),
+        station=camera.station,
     )
 
 

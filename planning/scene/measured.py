@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.arrays import rows_of
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.planned import PlannedCamera, PlannedProjector, meet
 from planning.model.requirements import TriangulationLimits
 from planning.scene.codes.patterns import panel_light, pattern_of
 from planning.scene.codes.surfaces import Coded
@@ -42,12 +42,14 @@ class LitSamples:
     """Samples with light and code of every projector of the plan on them.
 
     At least one projector lights each; `lit` says which, shape (n, n_projectors).
+    `stations` are where the projectors stand.
     """
 
     target: Target
     lit: NDArray[np.bool_]
     lights: tuple[LightOnSamples, ...]
     surfaces: tuple[Coded, ...]
+    stations: tuple[str, ...]
 
     @classmethod
     def of(
@@ -63,6 +65,7 @@ class LitSamples:
             lit,
             tuple(light_on(projector, target) for projector in projectors),
             tuple(pattern_of(projector).surfaces(points) for projector in projectors),
+            tuple(projector.station for projector in projectors),
         )
 
     def with_code(self, p: int, projector: PlannedProjector) -> "LitSamples":
@@ -107,6 +110,7 @@ def taken(
         rows_of(lit, chosen),
         tuple(light.take(chosen) for light in samples.lights),
         tuple(surfaces.take(chosen) for surfaces in samples.surfaces),
+        samples.stations,
     )
 
 
@@ -139,7 +143,7 @@ def pairs_of(
     wanted: NDArray[np.bool_] | None = None,
     projectors: Sequence[int] | None = None,
 ) -> Iterator[Pair]:
-    """Yield a camera's pair with each projector, on the samples that it sees.
+    """Yield a camera's pair with each projector that it meets, on samples it sees.
 
     Args:
         limits: Of pairs.
@@ -155,6 +159,8 @@ def pairs_of(
     if wanted is None:
         wanted = view.seen
     for p in range(len(lit.lights)) if projectors is None else projectors:
+        if not meet(lit.stations[p], view.station):
+            continue
         places = np.flatnonzero(lit.lit[samples, p] & wanted)
         chosen = samples[places]
         quality = pair_quality(
@@ -198,7 +204,9 @@ def measured_by(
     limits = scene.requirements.triangulation
     measured = np.zeros((len(lit.target), len(cameras)), dtype=bool)
     ends = np.cumsum([len(view.samples) for view in views])
-    starts = np.flatnonzero(np.diff(ends // _PAIRS, prepend=-1))
+    stations = np.unique([camera.station for camera in cameras], return_inverse=True)[1]
+    begins = np.diff(ends // _PAIRS, prepend=-1) != 0
+    starts = np.flatnonzero(begins | (np.diff(stations, prepend=-1) != 0))
     for first, last in pairwise([*starts.tolist(), len(views)]):
         scene.check_cancelled()
         column = np.repeat(
@@ -220,9 +228,10 @@ def furthest_failure(
     """Return how far samples come over all pairs: index in `CAUSES`, or `MEASURED`."""
     furthest = np.zeros(len(lit.target), dtype=np.int8)
     for camera in cameras:
-        scene.check_cancelled()
         seen = view_of(scene, camera, lit.target)
-        furthest = np.maximum(furthest, seen.first_violated)
+        with_it = [meet(station, camera.station) for station in lit.stations]
+        first = np.where(lit.lit[:, with_it].any(axis=1), seen.first_violated, 0)
+        furthest = np.maximum(furthest, first.astype(np.int8))
         for pair in pairs_of(scene.requirements.triangulation, lit, seen):
             chosen = pair.samples
             furthest[chosen] = np.maximum(furthest[chosen], pair.first_violated)
@@ -267,7 +276,7 @@ def measured_fold(pairs: NDArray[np.bool_], views: int) -> NDArray[np.bool_]:
 
 
 def without_projector(pairs: NDArray[np.bool_], p: int) -> NDArray[np.bool_]:
-    """Return the pairs that are left without a projector."""
+    """Return the pairs left without a projector."""
     return np.delete(pairs, p, axis=2)
 
 

@@ -23,9 +23,8 @@ from geometry.shapes.boxes import (
     lines_cross,
     triangles_touch,
 )
-from planning.model.bodies import Body, Existing
+from planning.model.bodies import Body, Existing, Obstacle
 from planning.model.device_poses import moved_to
-from planning.model.obstacles import Obstacle
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Requirements
 

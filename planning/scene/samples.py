@@ -44,20 +44,29 @@ class Target:
 
 @dataclass(frozen=True, eq=False)
 class SampleArrays:
-    """Arrays with one row a sample; a base of values that hold nothing else."""
+    """Arrays with one row a sample; other fields are said of all samples."""
 
     def take(self, chosen: NDArray[np.int64]) -> Self:
         """Return what is known of some of the samples."""
-        return type(self)(*[rows_of(array, chosen) for array in self._arrays()])
+        return self._with([rows_of(array, chosen) for array in self._arrays()])
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
-        """Return what is known of several sets of samples, one after the other."""
+        """Return what is known of several sets of samples, one after the other.
+
+        What is said of all samples must be the same in all parts.
+        """
         arrays = zip(*(part._arrays() for part in parts), strict=True)
-        return cls(*(np.concatenate(same) for same in arrays))
+        return parts[0]._with([np.concatenate(same) for same in arrays])
 
     def _arrays(self) -> list[NDArray[Any]]:
-        return [getattr(self, name) for name in self.__dataclass_fields__]
+        values = (getattr(self, name) for name in self.__dataclass_fields__)
+        return [value for value in values if isinstance(value, np.ndarray)]
+
+    def _with(self, arrays: list[NDArray[Any]]) -> Self:
+        """Return the same with other arrays, which are its first fields."""
+        names = [*self.__dataclass_fields__][len(arrays) :]
+        return type(self)(*arrays, *(getattr(self, name) for name in names))
 
 
 @dataclass(frozen=True, eq=False)

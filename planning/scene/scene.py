@@ -87,6 +87,10 @@ class Scene:
             return self
         return self._with(requirements=replace(self.requirements, region_coverage=0.0))
 
+    def within(self, workspace: Workspace) -> "Scene":
+        """Return the scene with another workspace."""
+        return self._with(requirements=replace(self.requirements, workspace=workspace))
+
     def _with(self, **changes: object) -> "Scene":
         other = replace(self, **changes)
         # What rays are cast against is the same mesh.

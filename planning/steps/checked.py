@@ -1,14 +1,14 @@
-"""A plan with what its check found."""
+"""A plan with what its check found, and what it misses."""
 
 from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
 from planning.report.entries.cost_entry import cost_record
+from planning.report.partial_plan import PartialPlan
+from planning.report.summary.shortfall import shortfalls
 from planning.verify.verification import Verification
 
 
-def with_check(
-    plan: RigPlan, verification: Verification, clock: Stopwatch
-) -> RigPlan:
+def with_check(plan: RigPlan, verification: Verification, clock: Stopwatch) -> RigPlan:
     """Return the plan with the record of its check, false claims among the failures."""
     check, record = verification.reconstruction, None
     if check is not None:
@@ -33,3 +33,21 @@ def with_check(
         ),
     )
     return RigPlan(document, plan.surface)
+
+
+def axes_may_help(plan: RigPlan, partial: PartialPlan) -> bool:
+    """Whether only the check isn't passed, and centred ring axes weren't asked for."""
+    if partial.axes == "free" or partial.request.ring_axis != "auto":
+        return False
+    check, alone = plan.document.reconstruction, {"reconstruction": None}
+    if check is None or check.passed:
+        return False
+    return not shortfalls(RigPlan(plan.document.changed(**alone), plan.surface))
+
+
+def missed_by(plan: RigPlan, *, check: bool) -> tuple[str, ...]:
+    """Return what of the requirements a plan misses, and the check if it was wanted."""
+    missed = shortfalls(plan)
+    if check and plan.document.reconstruction is None:
+        missed += ("the check wasn't made: the time limit came first",)
+    return missed

@@ -149,7 +149,9 @@ def prepared(request: PlanRequest, clock: Stopwatch) -> Prepared:
             model=model.name,
             code=code,
         )
-        for model in ((*rig.projector_models,) if requirements.pattern != "none" else ())
+        for model in (
+            (*rig.projector_models,) if requirements.pattern != "none" else ()
+        )
     )
     cameras = tuple(
         PlannedCamera("", np.eye(4), device, body=model.body, model=model.name)

@@ -229,13 +229,13 @@ def with_free_axes(
     """
     left = partial.axes == "centred" and partial.request.ring_axis == "auto"
     left = left and partial.surviving is None
-    if not left or _short_of(plan) != (False, True):
+    if not left or short_of(plan) != (False, True):
         return None
     clock.say("  centred ring axes fall short: free ones")
     return placed(partial.ready, partial.stage, clock, "free")
 
 
-def _short_of(plan: RigPlan) -> tuple[bool, bool]:
+def short_of(plan: RigPlan) -> tuple[bool, bool]:
     """Whether less than is required is lit, and measured, in all or of a region."""
     required, areas = plan.requirements, plan.coverage.target
     floors = [
@@ -263,7 +263,7 @@ def one_device_more(
     The proved bound stays what it is; the count is then above it, and says so.
     """
     required = plan.requirements
-    unlit, unmeasured = _short_of(plan)
+    unlit, unmeasured = short_of(plan)
     if partial.surviving is not None:
         # What is short with all devices there is short after a loss, too.
         return None

@@ -1,6 +1,7 @@
 """`--pattern none` from mesh to audited plan, what it can't be asked with, and lies."""
 
 import json
+
 import numpy as np
 import pytest
 from support.little_work import draw_fewer, work_little
@@ -224,7 +225,10 @@ def test_what_it_cant_be_asked_with_is_refused_in_a_line(ball, rig, wish, words)
 
 def test_bodies_and_standing_devices_are_refused(ball, tmp_path):
     for more, words in (
-        ("[camera.body]\nsize_mm = [50, 50, 50]\ncentre_mm = [0, 0, -30]\n", r"leave \[camera\.body\] out"),
+        (
+            "[camera.body]\nsize_mm = [50, 50, 50]\ncentre_mm = [0, 0, -30]\n",
+            r"leave \[camera\.body\] out",
+        ),
         (
             '[[existing]]\nkind = "camera"\nname = "old"\n'
             "position_mm = [1100, 0, 0]\naim_mm = [0, 0, 0]\n",

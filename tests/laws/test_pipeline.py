@@ -18,9 +18,9 @@ from planning.cli.other_commands import write_sample
 from planning.model.errors import InfeasibleLimitsError, InputError, TimeLimitError
 from planning.model.plan import InterruptedPlanError, RequirementError
 from planning.model.progress import Stopwatch
-from planning.pipeline import axes_may_help
 from planning.report.summary.summary import summary
 from planning.steps import stages
+from planning.steps.checked import axes_may_help
 from planning.steps.stages import with_free_axes
 from planning.verify.audit.audit import audit_plan
 

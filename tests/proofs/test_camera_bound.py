@@ -97,6 +97,7 @@ def everything_lit(scene, n):
         lit,
         (light,),
         (CodeSurfaces(*[one] * 4, across, 0.01 * one, np.zeros((len(one), 3))),),
+        ("",),
     )
 
 

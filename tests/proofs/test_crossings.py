@@ -36,7 +36,7 @@ def coded_rows(rng):
     light = PanelLight(distance, 5e-4 * one, one, one)
     falls = LightOnSamples(np.cos(away), 0.0 * one, panel.offsets)
     pixels = CodedPixels(DenseCode(), beams, panel, light)
-    return LitSamples(target, np.ones((N, 1), dtype=bool), (falls,), (pixels,))
+    return LitSamples(target, np.ones((N, 1), dtype=bool), (falls,), (pixels,), ("",))
 
 
 @pytest.mark.parametrize("name", ["plain", "bent"])

@@ -11,7 +11,7 @@ from geometry.devices import PinholeModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import box
 from planning.cli.main import commands
-from planning.model.obstacles import Obstacle
+from planning.model.bodies import Obstacle
 from planning.report.summary.device_lines import device_lines
 from planning.report.summary.zone_lines import zone_lines
 from planning.verify.audit.devices.camera_figures import camera_figures

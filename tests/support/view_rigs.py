@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from support.dense_rigs import dense_scanner
-from support.factories import make_camera, make_requirements, make_rig, make_scene
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
@@ -14,6 +12,8 @@ from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from planning.verify.reconstruction.calibration import CameraCalibration
 from planning.verify.reconstruction.scanner import Scanner
+from support.dense_rigs import dense_scanner
+from support.factories import make_camera, make_requirements, make_rig, make_scene
 
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
 from planning.model.document.device_records import BaselineRow
-from planning.model.planned import PlannedCamera
+from planning.model.planned import PlannedCamera, meet
 
 from .coverage_triangle import SeamAngles, baseline_parts, largest_baseline, seam_angles
 from .seams import SampledSurface, Seam, both_orders, find_seams, neighbouring_pairs
@@ -67,7 +67,11 @@ def baseline_rows(
     `docs/method/baselines.md` defines every key.
     """
     rows: list[BaselineRow] = []
-    pairs = neighbouring_pairs(measured_by, surface)
+    pairs = [
+        (i, j)
+        for i, j in neighbouring_pairs(measured_by, surface)
+        if meet(cameras[i].station, cameras[j].station)
+    ]
     for seam in find_seams(both_orders(pairs), surface, measured_by):
         pair = [cameras[index] for index in seam.cameras]
         test = check_seam(pair, surface, seam, camera_max_incidence)

@@ -56,9 +56,7 @@ def widest_sample(
 ) -> float:
     """Return the largest z / (f cos(incidence)) of samples in cameras' views [m]."""
     widest = 0.0
-    for camera, view in zip(
-        cameras, camera_views(scene, cameras, target), strict=True
-    ):
+    for camera, view in zip(cameras, camera_views(scene, cameras, target), strict=True):
         ahead = camera.world_from_device[:3, 2]
         depth = view.view.distances * (view.view.rays @ ahead)
         size = depth / (camera.device.focal_px * np.maximum(view.view.facing, 1e-9))

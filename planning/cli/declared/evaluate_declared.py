@@ -15,6 +15,7 @@ from .plan_declared import GroupedCommand, check_options, rig_command
 _OF_PLANS = {
     "ranges": None,
     "max_projectors": None,
+    "max_heads": None,
     "max_cameras": None,
     "fixed": None,
     "robust": None,

@@ -20,6 +20,7 @@ from .export_declared import check_rendering, rendering_options
 # import than `plan show --help` may.
 _SECTIONS = {
     "places": "Object, zones and devices in the axes of the mesh.",
+    "stations": "Heads, their stations, or steps of a turntable, with their devices.",
     "cameras": "Of each camera mm per pixel, image filled, distances, angles.",
     "coverage": "Areas that are lit and measured, and what is left out.",
     "proofs": "What was proved of the numbers of devices.",

@@ -17,7 +17,13 @@ def check_options(options: dict[str, Any]) -> None:
     if options["unit"] and options["size_mm"] is not None:
         raise click.UsageError("give --unit or --size-mm, not both")
     _check_target(options)
-    if options["pattern"] != "rings":
+    if options["max_heads"] is not None:
+        for name in ("max_projectors", "max_cameras"):
+            if options[name] is not None:
+                raise click.UsageError(
+                    f"give --max-heads or --{name.replace('_', '-')}, not both"
+                )
+    if options["pattern"] in ("dense", "none"):
         _check_without_rings(options)
 
 
@@ -46,9 +52,16 @@ def check_projectors(options: dict[str, Any]) -> None:
                 f"--max-projectors {most} with --pattern none, which has no projector: "
                 f"leave it out"
             )
+        if options["max_heads"] is not None:
+            raise click.UsageError(
+                "--max-heads with --pattern none: heads have projectors; leave one out"
+            )
         options["max_projectors"] = 0
     elif most is None:
-        raise click.UsageError("Missing option '--max-projectors'.")
+        if options["max_heads"] is None:
+            raise click.UsageError(
+                "give --max-projectors N, or --max-heads N of a [head]"
+            )
     elif most < 1:
         raise click.UsageError(
             f"Invalid value for '--max-projectors': {most} is not in the range x>=1."

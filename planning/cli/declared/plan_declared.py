@@ -24,7 +24,8 @@ _GROUPS = {
         *("target", "select", "weight"),
     ),
     "With what, and where": (
-        *("max_projectors", "max_cameras", "rig_name", "light", "pattern"),
+        *("max_projectors", "max_cameras", "max_heads"),
+        *("rig_name", "light", "pattern"),
         *("ring_axis", "fixed", "poses"),
     ),
     "How well": (
@@ -91,13 +92,19 @@ class GroupedCommand(click.Command):
     "--max-projectors",
     type=click.IntRange(0),
     metavar="N",
-    help="Projectors at most; required, but with --pattern none.",
+    help="Projectors at most; needed unless --max-heads or --pattern none is given.",
 )
 @click.option(
     "--max-cameras",
     type=click.IntRange(1),
     metavar="N",
     help="Cameras at most [default: as many as needed].",
+)
+@click.option(
+    "--max-heads",
+    type=click.IntRange(1),
+    metavar="N",
+    help="Of a rig with a [head]: heads at most, or its [stations].",
 )
 @click.option(
     "--unit",
@@ -130,10 +137,8 @@ class GroupedCommand(click.Command):
 @click.option(
     "--pattern",
     type=click.Choice(["rings", "dense", "none"]),
-    default="rings",
-    show_default=True,
     help="Rings, a code of every pixel (see [dense] of the rig file), or none: cameras "
-    "alone, by the texture of the object.",
+    "alone, by the object's texture [default: rings; of a head or a turntable dense].",
 )
 @click.option(
     "--ring-axis",

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
-from planning.model.obstacles import Obstacle
+from planning.model.bodies import Obstacle
 from planning.model.planned import PlannedCamera
 from planning.verify.reconstruction.render.mitsuba.materials import Surface
 from planning.verify.reconstruction.render.mitsuba.scene_files import write_scenes

@@ -59,6 +59,7 @@ class ProjectorRecord(Part):
         exposure: Absent where the rig says nothing of light.
         model: Name of its model, where the rig has several or counts them.
         code: Of the pattern `dense`, which has no rings.
+        station: Where it stands, of `stations`, with those that it measures with.
     """
 
     id: str
@@ -82,6 +83,7 @@ class ProjectorRecord(Part):
     exposure: ExposureRecord | None = None
     model: str = ""
     code: DenseCode | None = None
+    station: str = ""
 
     @model_validator(mode="after")
     def _shows_something(self) -> Self:
@@ -110,6 +112,7 @@ class ProjectorRecord(Part):
             exposure_s=None if self.exposure is None else self.exposure.exposure_s,
             model=self.model,
             code=self.code,
+            station=self.station,
         )
 
     def _device(self) -> PinholeModel | ParallelModel:
@@ -135,6 +138,7 @@ class CameraRecord(Part):
         sole_area_m2: Area that no other camera measures.
         world_from_mount: As of projectors.
         model: As of projectors.
+        station: As of projectors.
     """
 
     id: str
@@ -150,6 +154,7 @@ class CameraRecord(Part):
     existing: bool = False
     name: str = ""
     model: str = ""
+    station: str = ""
 
     def planned(self) -> PlannedCamera:
         """Return the camera.
@@ -171,7 +176,9 @@ class CameraRecord(Part):
                 )
         pose = np.array(self.world_from_device)
         existing = self.name if self.existing else ""
-        return PlannedCamera(self.id, pose, device, existing, self.body, self.model)
+        return PlannedCamera(
+            *(self.id, pose, device, existing, self.body, self.model, self.station)
+        )
 
 
 def projector_record(
@@ -212,8 +219,10 @@ def _described(
     kept = {key: value for key, value in optics if key in record.model_fields}
     body = {} if device.body is None else {"body": device.body}
     name = {"existing": True, "name": device.existing} if device.existing else {}
-    model = {"model": device.model} if device.model else {}
-    return kept | body | name | model
+    told = {
+        key: value for key in ("model", "station") if (value := getattr(device, key))
+    }
+    return kept | body | name | told
 
 
 class BaselineRow(Part):

@@ -29,6 +29,7 @@ from .input_records import (
 )
 from .part import Part
 from .ring_records import RingAxes
+from .station_records import StationsRecord
 from .survival_records import SurvivalRecord
 
 FORMAT = "ringrig-plan"
@@ -103,6 +104,7 @@ class PlanDocument(Part):
     evaluation: EvaluationRecord | None = None
     robust: RobustRecord | None = None
     survival: SurvivalRecord | None = None
+    stations: StationsRecord | None = None
     camera_groups: tuple[tuple[str, ...], ...] = ()
     assumed: tuple[str, ...] = ()
     cost: CostRecord

@@ -122,4 +122,5 @@ def _viewed(camera: PlannedCamera, rays: CameraRays) -> ViewedSamples:
         rays.facing,
         turn @ camera.device.ray_jacobian(rays.local),
         camera.device.project(rays.local) - camera.device.camera_matrix[:2, 2],
+        station=camera.station,
     )

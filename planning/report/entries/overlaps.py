@@ -36,9 +36,12 @@ _ANY_LIGHT = ProjectorLimits(float(np.radians(89.0)), 0.0)
 
 
 def overlap_records(
-    scene: Scene, projectors: Sequence[PlannedProjector]
+    scene: Scene, projectors: Sequence[PlannedProjector], *, moved: bool = False
 ) -> tuple[tuple[Overlap, ...], ExposureSchedule]:
-    """Return the plan's `overlaps` and `firing_schedule`, from fresh samples."""
+    """Return the plan's `overlaps` and `firing_schedule`, from fresh samples.
+
+    Projectors at different stations are one that is `moved`, or else stand apart.
+    """
     target = scene.target_samples(DRAWS.overlaps)
     surface = scene.surface_samples(DRAWS.overlaps)
     on_target = shared_areas(scene, projectors, target)
@@ -53,6 +56,9 @@ def overlap_records(
         for i, j in combinations(range(len(names)), 2)
     )
     conflicts = (on_target > 0.0) | (on_surface > 0.0)
+    if moved:
+        at = np.array([projector.station for projector in projectors])
+        conflicts |= at[:, None] != at
     np.fill_diagonal(conflicts, val=False)
     colouring = fewest_colours(conflicts)
     return overlaps, ExposureSchedule(

@@ -167,7 +167,11 @@ def views_per_face(
             good = (passed == GOOD) & views.measured[both]
             better = np.flatnonzero(good & (total < least[both]))
             rows = both[better]
-            least[rows], best[rows], angle[rows] = total[better], p * n_c + c, met[better]
+            least[rows], best[rows], angle[rows] = (
+                total[better],
+                p * n_c + c,
+                met[better],
+            )
             for name, values in errors.items():
                 terms.setdefault(name, np.full(n, np.nan))[rows] = values[better]
     sigma = np.where(best >= 0, least, np.nan)

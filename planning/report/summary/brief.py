@@ -22,6 +22,7 @@ from .proof_lines import user_selection
 from .region_lines import worst_region
 from .robust_lines import robust_cost
 from .shortfall import Shortfall, missing
+from .station_lines import fewest_words, title_words
 from .summary import lost_in_field
 from .warning_lines import warnings
 
@@ -74,6 +75,8 @@ def _block(label: str, text: str, most: int) -> list[str]:
 def _head(plan: RigPlan, short: Sequence[Shortfall]) -> Iterator[_Block]:
     document, rig = plan.document, plan.document.rig
     devices = devices_words(plan)
+    if document.stations is not None:
+        devices = f"{title_words(document.stations)} ({devices})"
     state = unchecked(plan)
     if document.truncated:
         state = f"TRUNCATED{', NOT CHECKED' * bool(state)}"
@@ -134,9 +137,8 @@ def _devices(plan: RigPlan, room: int) -> list[str]:
         )
         lines.append(
             f"{device.id:<4} {x:9.1f} {y:9.1f} {z:9.1f}  {pan:9.1f} {tilt:7.1f} "
-            f"{roll:7.1f}   {azimuth:11.1f} {elevation:11.1f}   {distance:8.1f}{kept}"[
-                :COLUMNS
-            ]
+            f"{roll:7.1f}   {azimuth:11.1f} {elevation:11.1f}   {distance:8.1f}"
+            f"{f'  {device.station}' if device.station else ''}{kept}"[:COLUMNS]
         )
     if len(told) < len(every):
         lines.append(f"         and {len(every) - len(told)} more: {_ELSEWHERE}")
@@ -183,6 +185,9 @@ def _measured(plan: RigPlan) -> Iterator[_Block]:
 def _fewest(plan: RigPlan) -> Iterator[_Block]:
     """Say what is known of fewer devices, over the candidates and over every pose."""
     if plan.document.evaluation is not None:
+        return
+    if fewest := fewest_words(plan):
+        yield "FEWEST", fewest, 2
         return
     proofs = plan.document.certificates
     kinds = {"camera": proofs.cameras}

@@ -16,15 +16,18 @@ from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.words import count_words
 from planning.scene.placed_bodies import bodies_of
 
+from .station_lines import device_counts
+
 _AXES = "xyz"
 
 
 def devices_words(plan: RigPlan, between: str = " and ") -> str:
     """Return how many devices of each kind a plan has; no projectors aren't told."""
-    cameras = count_words(len(plan.cameras), "camera")
+    n_projectors, n_cameras = device_counts(plan)
+    cameras = count_words(n_cameras, "camera")
     if plan.cameras_alone:
         return cameras
-    return f"{count_words(len(plan.projectors), 'projector')}{between}{cameras}"
+    return f"{count_words(n_projectors, 'projector')}{between}{cameras}"
 
 
 def device_lines(plan: RigPlan) -> list[str]:
@@ -48,6 +51,7 @@ def device_lines(plan: RigPlan) -> list[str]:
         lines.append(
             f"{device.id:<4} {x:9.1f} {y:9.1f} {z:9.1f}    {pan:15.1f} {tilt:7.1f} "
             f"{roll:7.1f}   {azimuth:8.1f} {elevation:10.1f}   {distance:18.1f}"
+            + (f"   {device.station}" if device.station else "")
             + (f"   {device.model}" if device.model else "")
             + (f"   existing: {device.existing}" if device.existing else "")
         )

@@ -3,9 +3,11 @@
 from planning.model.document.certificates import Certificate
 from planning.model.document.input_records import SelectionRecord
 from planning.model.plan import RigPlan
-from planning.model.words import count_words, percent
+from planning.model.words import count_words, labelled, percent
 from planning.report.tolerance.survival_lines import surviving_proofs
 from planning.scene.lights import light_of
+
+from .station_lines import fewest_words
 
 _EXCLUDED = {
     "projector_beam": "lie outside the beam",
@@ -38,6 +40,8 @@ def proof_lines(plan: RigPlan) -> list[str]:
             _continuous(proofs.cameras, "position, aim and roll"),
             f"         {_regions(plan)}",
         ]
+    if fewest := fewest_words(plan):
+        return ["", *labelled("FEWEST", [fewest]), f"         {_regions(plan)}"]
     poses = light_of(plan.projectors[0].device).bounded_over
     return [
         "",

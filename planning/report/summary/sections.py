@@ -14,6 +14,7 @@ from .proof_lines import proof_lines
 from .region_lines import region_table
 from .ring_lines import code_lines, range_lines, ring_lines
 from .robust_lines import robust_lines
+from .station_lines import station_lines
 from .zone_lines import zone_lines
 
 
@@ -49,6 +50,11 @@ SECTIONS = (
             *gap_lines(plan),
             *mount_lines(plan),
         ],
+    ),
+    Section(
+        "stations",
+        "heads, stations or steps with their devices, and what trades against what.",
+        station_lines,
     ),
     Section(
         "coverage",

@@ -9,7 +9,7 @@ from geometry.mesh.mesh import TriangleMesh
 from planning.model.document.input_records import MeshRecord
 from planning.model.plan import RigPlan
 from planning.model.requirements import Workspace
-from planning.model.words import count_words, labelled, percent
+from planning.model.words import labelled, percent
 from planning.report.tolerance.survival_lines import survival_lines
 
 from .check_lines import check_lines, cost_lines, unchecked
@@ -19,6 +19,7 @@ from .light_lines import light_lines
 from .proof_lines import proof_lines
 from .ring_lines import code_lines, range_lines, ring_lines
 from .robust_lines import robust_lines
+from .station_lines import station_lines
 from .warning_lines import warning_lines
 
 # An object under this share of the field is taken to be in another unit.
@@ -43,6 +44,7 @@ def summary(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
         *proof_lines(plan),
         *coverage_lines(plan),
         *light_lines(plan),
+        *station_lines(plan),
         *survival_lines(plan),
         *robust_lines(plan),
         *range_lines(plan.document),

@@ -5,12 +5,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
-from geometry.devices import ParallelModel, PinholeModel
+from geometry.devices import DeviceModel, ParallelModel, PinholeModel
 from planning.model.bodies import Mount
 from planning.model.errors import RigError
+from planning.model.heads import Head, Stations, Turntable
 from planning.rig.rig_tables import ParallelTable, PinholeTable, RigTable
 
-from .models import Model, models_of
+from .models import Model, models_of, named
+from .rig_heads import head_of, stations_of, turntable_of
 
 Light = Literal["diverging", "parallel"]
 
@@ -72,6 +74,32 @@ class RigDevices:
         """Optics of all models of projectors, and of cameras."""
         lit = tuple(model.device for model in self.projector_models)
         return lit, tuple(pinhole_of(model) for model in self.camera_models)
+
+    def optics_of(self, kind: str, model: str = "") -> DeviceModel:
+        """Return the optics of a `projector` or a `camera` by its model's name.
+
+        Raises:
+            RigError: If the rig has no such model.
+        """
+        found = named(self.models(kind), model)
+        if found is None:
+            raise RigError(f"rig {self.name}: no {kind} is called {model!r}")
+        return found.device
+
+    @cached_property
+    def head(self) -> Head | None:
+        """The sensor head that its devices stand in; None: they stand alone."""
+        return head_of(self.table, self.optics_of)
+
+    @cached_property
+    def turntable(self) -> Turntable | None:
+        """The table that turns the part; its point counts from `Workspace.origin_m`."""
+        return turntable_of(self.table)
+
+    @property
+    def stations(self) -> Stations | None:
+        """How often the head is set down, and by what; None: it isn't carried."""
+        return stations_of(self.table)
 
     def mounts(self) -> dict[str, Mount | None]:
         """Return `projector_mount` and `camera_mount` of `Workspace`."""

@@ -3,6 +3,8 @@
 from typing import Any
 
 DEVICES = ("projector", "parallel_projector", "camera")
+# What a file takes whole by its name, and else key by key with what it replaces.
+NAMED_WHOLE = (*DEVICES, "head")
 # Tables that may name a preset: by which key, and where those are.
 PRESETS = {
     "calibration": ("from", "calibrations"),
@@ -13,13 +15,15 @@ _SAME = (
     ("focal_px", "focal_mm", "throw_ratio"),
     ("principal_point_px", "vertical_offset_percent"),
 )
+# The two ways to say a head's volume, of several keys each.
+_BOX, _FRUSTUM = {"volume_mm"}, {"near_mm", "far_mm", "near_size_mm", "far_size_mm"}
 
 
 def lay_over(base: dict[str, Any], tables: dict[str, Any]) -> dict[str, Any]:
     """Return a preset's tables with a file's laid over them, key by key.
 
-    A device that the file names is taken whole from the file; without a name its
-    figures replace those of the preset, whose sources for them no longer hold.
+    A device or head that the file names is taken whole from the file; without a name
+    its figures replace those of the preset, whose sources for them no longer hold.
     """
     merged = {**base}
     for key, value in tables.items():
@@ -28,7 +32,7 @@ def lay_over(base: dict[str, Any], tables: dict[str, Any]) -> dict[str, Any]:
             merged[key] = value
         elif key in PRESETS:
             merged[key] = lay_figures_over(old, value)
-        elif key not in DEVICES:
+        elif key not in NAMED_WHOLE:
             merged[key] = {**old, **value}
         else:
             merged[key] = value if "name" in value else lay_device_over(old, value)
@@ -39,12 +43,14 @@ def lay_device_over(base: dict[str, Any], given: dict[str, Any]) -> dict[str, An
     """Return a device with some of its figures replaced."""
     replaced = {key for key in given if not isinstance(given[key], dict)}
     replaced |= {key for group in _SAME if replaced & set(group) for key in group}
+    replaced |= _FRUSTUM if replaced & _BOX else set()
+    replaced |= _BOX if replaced & _FRUSTUM else set()
     device = {key: value for key, value in base.items() if key not in replaced}
     focus = given.get("focus")
     if isinstance(focus, dict):
         replaced |= {f"focus.{key}" for key in focus}
         device["focus"] = {**base.get("focus", {}), **focus}
-    whole = tuple(f"{key}." for key in ("body", "mount") if key in given)
+    whole = tuple(f"{key}." for key in ("body", "mount", "stated") if key in given)
     older, newer = base.get("sources", {}), given.get("sources", {})
     sources: object = older
     if isinstance(older, dict):

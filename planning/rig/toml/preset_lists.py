@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from planning.model.light.photometry_table import SensorTable
 from planning.model.table_types import SourcedTable
 from planning.rig.rig_tables import CalibrationTable
+from planning.rig.tables.head_tables import HeadDeviceTable
 
 from .catalogue import catalogue
 from .laying import DEVICES
@@ -73,6 +74,9 @@ def _preset(name: str) -> Preset:
         if device is not None:
             devices[role] = device.name
             figures += _figures(role, device)
+    if table.head is not None:
+        devices["head"] = table.head.name
+        figures += _figures("head", table.head)
     if table.calibration.description:
         devices["calibration"] = table.calibration.description
     return Preset(name, table.description, devices, tuple(figures))
@@ -84,5 +88,14 @@ def _figures(role: str, table: SourcedTable) -> tuple[Figure, ...]:
         value: object = table
         for part in key.split("."):
             value = getattr(value, part)
+        if isinstance(value, list):
+            value = [_plain(each) for each in value]
         figures.append(Figure(role, key, value, table.sources.get(key, "assumed")))
     return tuple(figures)
+
+
+def _plain(value: object) -> object:
+    """A device of a head as what was written of it."""
+    if not isinstance(value, HeadDeviceTable):
+        return value
+    return value.model_dump(exclude_unset=True)

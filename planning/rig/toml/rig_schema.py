@@ -22,7 +22,7 @@ _TABLES = {
 # What a file lays over a base or a device needs no key of its own.
 _LAID = (
     *("CameraTable", "ProjectorTable", "ParallelTable", "FocusTable"),
-    *("CalibrationTable", "PhotometryTable"),
+    *("CalibrationTable", "PhotometryTable", "HeadTable"),
 )
 _UNITS = {
     "mm": "mm",
@@ -62,9 +62,25 @@ _NAMED = {
     "check": "what the reconstruction from pixels must reach",
     "existing": "devices that stand already, and stay",
     "obstacle": "what stands in the way of light and views",
+    "head": "one rigid body with its projectors and cameras",
+    "stated": "what the head's maker states; nothing is planned with it",
+    "turntable": "turns the part, while devices stand",
+    "stations": "poses of the head, which is carried between them",
     "kind": "of the model of [projector] or of [camera]",
     "normal": "of a mounting plane: out of it, towards the object or away",
     "sources": "for each figure what was read where, or assumed: and why",
+}
+# What a key means in one table alone.
+_OF_TABLE = {
+    ("HeadTable", "projector"): "its projectors, and where they stand in it",
+    ("HeadTable", "camera"): "its cameras, and where they stand in it",
+    ("HeadDeviceTable", "name"): "of this device within the head",
+    ("HeadDeviceTable", "roll_deg"): "with position_mm and aim_mm: clockwise as the "
+    "device sees it, 0 with the image upright, which is the head's -y",
+    (
+        "HeadDeviceTable",
+        "model",
+    ): "which of a list of models; the first if absent",
 }
 _KEY = re.compile(r"`(\w+)`")
 _CELLS = re.compile(r"(?<!\\)\|")
@@ -92,7 +108,7 @@ def rig_schema(page: str) -> str:
             for noise in ("title", "default")[: 2 if "$ref" in entry else 1]:
                 entry.pop(noise, None)
             found = words.get((section, key)) or words.get(("", key), "")
-            text = _NAMED.get(key) or found
+            text = _OF_TABLE.get((name, key)) or _NAMED.get(key) or found
             unit = _UNITS.get(key.rpartition("_")[2], "") if "_" in key else ""
             entry["description"] = (f"{text} [{unit}]" if unit else text).strip()
     for role in DEVICES:

@@ -79,6 +79,7 @@ class ViewedSamples(SampleArrays):
         facing: -N.r, shape (n,).
         jacobian: J_r in the world in [1/px], shape (n, 3, 2); 0 where a limit fails.
         off_centre: Pixels from the principal point, shape (n, 2); 0 likewise.
+        station: Where the camera stands.
     """
 
     first_violated: NDArray[np.int8]
@@ -87,6 +88,7 @@ class ViewedSamples(SampleArrays):
     facing: Array
     jacobian: Array
     off_centre: Array
+    station: str = ""
 
     @property
     def seen(self) -> Mask:

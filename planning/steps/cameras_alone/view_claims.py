@@ -148,5 +148,3 @@ def _region_samples(
         np.full(len(target), -1),
         np.concatenate([part.views.by_pair for part in parts]),
     )
-
-

@@ -16,6 +16,7 @@ from planning.verify.audit.counts.overlap_claims import (
     audit_overlaps,
     audit_schedule,
 )
+from planning.verify.audit.counts.station_claims import audit_stations
 from planning.verify.audit.counts.table_claims import (
     audit_limits,
     audit_scales,
@@ -63,6 +64,7 @@ _CLAIMS = (
     audit_exposures,
     audit_mounts,
     audit_stock,
+    audit_stations,
     audit_obstacles,
     audit_areas,
     audit_inside,

@@ -37,6 +37,7 @@ class DeviceCalibration:
             [m], 1 / pixel pitch on the diagonal.
         resolution: Width and height in [px].
         body: Its housing; None: it takes no room.
+        station: Where it stands with those that it measures with; empty: with any.
     """
 
     id: str
@@ -44,6 +45,7 @@ class DeviceCalibration:
     matrix: Array
     resolution: tuple[int, int]
     body: Body | None = field(default=None, kw_only=True)
+    station: str = field(default="", kw_only=True)
 
     @property
     def centre(self) -> Array:
@@ -264,6 +266,7 @@ def calibrate_camera(camera: PlannedCamera) -> CameraCalibration:
         device.resolution,
         device.distortion,
         body=camera.body,
+        station=camera.station,
     )
 
 
@@ -290,6 +293,7 @@ def calibrate_projector(projector: PlannedProjector) -> ProjectorCalibration:
         beam_radius,
         DrawnRings(LIGHTS[projector.light], projector.ring_radii),
         body=projector.body,
+        station=projector.station,
         dense=None if code is None else DensePattern(code, device.resolution),
         distortion=(0.0,) * 5 if code is None else lens,
     )

@@ -7,10 +7,10 @@ from typing import Self
 import numpy as np
 
 from geometry.mesh.mesh import TriangleMesh
+from planning.model.bodies import Obstacle
 from planning.model.calibration_errors import CalibrationErrors
 from planning.model.errors import InputError
 from planning.model.light.light_budget import LightBudget
-from planning.model.obstacles import Obstacle
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedProjector
 from planning.model.requirements import CheckLimits
@@ -176,10 +176,16 @@ class Scanner:
         )
 
     def pairs(self) -> Iterator[tuple[tuple[int, int], PairCalibration]]:
-        """Yield the indices of projector and camera and both, camera by camera."""
+        """Yield the indices of projector and camera and both, camera by camera.
+
+        Of those that stand at one station, or of which either stands at none.
+        """
         for c, camera in enumerate(self.cameras):
             for p, projector in enumerate(self.projectors):
-                yield (p, c), PairCalibration(projector, camera)
+                if camera.station == projector.station or not (
+                    camera.station and projector.station
+                ):
+                    yield (p, c), PairCalibration(projector, camera)
 
     def name(self, pair: tuple[int, int]) -> str:
         """Return what a pair is called."""

@@ -1,13 +1,14 @@
 """Claims about overlaps: of light, so who fires together, and of what is measured."""
 
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from geometry.arrays import Mask
 from planning.model.document.coverage_records import Overlap
+from planning.model.document.station_records import StationsRecord
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.audit_samples import AuditSamples
@@ -109,6 +110,7 @@ def audit_schedule(case: AuditCase, findings: AuditFindings) -> None:
         return
     names = [projector.id for projector in document.projectors]
     groups, near = schedule.groups, _overlapping(names, document.overlaps)
+    _separate(near, document.stations)
     if not findings.partition("groups", groups, names):
         return
     for group in groups:
@@ -152,6 +154,16 @@ def _overlapping(
             near[one].add(other)
             near[other].add(one)
     return near
+
+
+def _separate(near: dict[str, set[str]], stations: StationsRecord | None) -> None:
+    """Take projectors at different stations as overlapping: they are one, moved."""
+    if stations is None or stations.kind == "heads":
+        return
+    for one, other in combinations(stations.stations, 2):
+        for a, b in product(one.projectors, other.projectors):
+            near[a].add(b)
+            near[b].add(a)
 
 
 def _colourable(near: dict[str, set[str]], k: int) -> bool:

@@ -99,10 +99,10 @@ def audit_clearance(case: AuditCase, findings: AuditFindings) -> None:
                 f"touches the {name}; it must stand off it",
             )
         if not device.existing:
-            _audit_zones(block, space, below)
+            audit_body_zones(block, space, below)
 
 
-def _audit_zones(block: Block, space: Workspace, findings: AuditFindings) -> None:
+def audit_body_zones(block: Block, space: Workspace, findings: AuditFindings) -> None:
     """Check that a body stands above the floor, in the box and off keep-out zones."""
     centre = np.array(space.centre)
     if space.floor_m is not None:

@@ -100,7 +100,8 @@ def _lights(
     for p, projector in enumerate(audit_projectors(plan)):
         light, _ = projector.light.to_points(samples.points)
         measured = np.flatnonzero(actual.pairs[p, c] == MEASURED)
-        yield plan.projectors[p].id, light, measured
+        if plan.projectors[p].station in ("", plan.cameras[c].station):
+            yield plan.projectors[p].id, light, measured
 
 
 def _angles(light: Array, camera: PlannedCamera, points: Array, chosen: Ints) -> Array:

@@ -23,6 +23,7 @@ from .workspace_claims import (
     SAME_POSE,
     audit_poses,
     audit_ring_frames,
+    in_room,
     outside_by,
 )
 from .zone_claims import origin_of
@@ -52,7 +53,7 @@ def audit_devices(case: AuditCase, findings: AuditFindings) -> None:
             _audit_model(kind, record, document.rig, findings.at(record.id))
             poses, below = np.array([record.world_from_device]), findings.at(record.id)
             audit_poses("world_from_device", poses, below)
-            position = poses[:, :3, 3]
+            position = in_room(case.plan, record.station, poses[:, :3, 3])
             excess = float(outside_by(position, kind.shell, space)[0])
             # An existing device stands where it stands: `audit_existing` checks that.
             below.holds(

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from geometry.arrays import Array
-from planning.model.obstacles import Obstacle
+from planning.model.bodies import Obstacle
 from planning.model.plan import RigPlan
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings

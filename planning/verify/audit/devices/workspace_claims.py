@@ -50,7 +50,9 @@ def audit_workspace(case: AuditCase, findings: AuditFindings) -> None:
         key = f"surface.npz reference_{kind.name}s"
         movable = movable_references(kind, case.plan)
         audit_poses(key, movable, findings)
-        excess = outside_by(movable[:, :3, 3], kind.shell, space)
+        # What stands still is in the room of a turntable, which turns about the part.
+        about = space.whole_shell if turns(case.plan) else space
+        excess = outside_by(movable[:, :3, 3], kind.shell, about)
         count = int((~(excess <= POSITION_M)).sum())
         findings.holds(
             count == 0,
@@ -64,6 +66,25 @@ def audit_workspace(case: AuditCase, findings: AuditFindings) -> None:
         device = case.plan.projectors[0].device
         light = light_from(device, surface.reference_projectors)
         audit_ring_frames(key, light, surface.reference_rings, findings)
+
+
+def turns(plan: RigPlan) -> bool:
+    """Return whether the part is on a turntable."""
+    stations = plan.document.stations
+    return stations is not None and stations.kind == "turntable"
+
+
+def in_room(plan: RigPlan, station: str, positions: Array) -> Array:
+    """Return where devices at a station stand in the room, (n, 3) [m].
+
+    Before a turntable they are seen by the part as turned back.
+    """
+    stations = plan.document.stations
+    if stations is None or not turns(plan):
+        return positions
+    poses = {one.id: np.array(one.world_from_station) for one in stations.stations}
+    back = np.linalg.inv(poses.get(station, np.eye(4)))
+    return positions @ back[:3, :3].T + back[:3, 3]
 
 
 def outside_by(positions: Array, shell: tuple[float, float], space: Workspace) -> Array:

@@ -88,6 +88,9 @@ def _audit_shell(case: AuditCase, findings: AuditFindings) -> None:
     if standoff is None or play is None:
         return
     middle = standoff + space.object_radius_m
+    # A head's devices stand beside its origin, to which the standoff counts, and about
+    # a turntable's axis the object's centre turns as well.
+    play += _lever_m(case.plan) + _off_axis_m(case.plan)
     for kind in case.kinds:
         radius, name = f"{kind.name}_radius_m", f"{kind.name}_standoff_m"
         tiled = getattr(space, name)
@@ -98,6 +101,24 @@ def _audit_shell(case: AuditCase, findings: AuditFindings) -> None:
             name,
             f"{tiled!r} m, but rig.standoff_m is {standoff:g} m",
         )
+
+
+def _lever_m(plan: RigPlan) -> float:
+    """How far from a head's origin a device of it is at most [m]; 0 without a head."""
+    head, planned = plan.document.rig.head, plan.document.stations
+    if head is None or planned is None:
+        return 0.0
+    places = [np.array(device.head_from_device)[:3, 3] for device in head.devices]
+    return float(max(np.sqrt(place @ place) for place in places))
+
+
+def _off_axis_m(plan: RigPlan) -> float:
+    """How far the object's centre is from a turntable's axis [m]; 0 without one."""
+    stations = plan.document.stations
+    if stations is None or stations.axis is None or stations.point_m is None:
+        return 0.0
+    off = np.array(plan.requirements.workspace.centre) - np.array(stations.point_m)
+    return float(np.linalg.norm(np.cross(off, np.array(stations.axis))))
 
 
 def origin_of(plan: RigPlan) -> Array:

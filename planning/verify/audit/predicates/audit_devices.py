@@ -204,7 +204,8 @@ class AuditProjector:
     `radii` are of its rings, of a reference pose the outermost alone; `blocks` are the
     bodies of other devices, which stand in its light. `exposure_s` is what its frames
     are exposed for [s], where the plan counts light. With a `code` all its pixels are
-    told, and there are no rings.
+    told, and there are no rings. `station` is where it stands with the cameras that it
+    measures with; empty: with any.
     """
 
     device: PinholeModel | ParallelModel
@@ -214,6 +215,7 @@ class AuditProjector:
     blocks: tuple[Block, ...] = ()
     exposure_s: float | None = None
     code: DenseCode | None = None
+    station: str = ""
 
     @cached_property
     def light(self) -> DivergingRays | ParallelRays:
@@ -254,11 +256,18 @@ class AuditProjector:
 
 @dataclass(frozen=True, eq=False)
 class AuditCamera:
-    """A camera at a pose, and the bodies of other devices."""
+    """A camera at a pose, and the bodies of other devices; `station` as above."""
 
     device: PinholeModel
     world_from_device: Array
     blocks: tuple[Block, ...] = ()
+    station: str = ""
+
+    def works_with(self, projector: AuditProjector) -> bool:
+        """Return whether both stand at one station, or either at none."""
+        return "" in (self.station, projector.station) or (
+            self.station == projector.station
+        )
 
 
 def audit_projectors(plan: RigPlan) -> tuple[AuditProjector, ...]:
@@ -272,6 +281,7 @@ def audit_projectors(plan: RigPlan) -> tuple[AuditProjector, ...]:
             bodies_but(plan, p),
             p.exposure_s,
             p.code,
+            p.station,
         )
         for p in plan.projectors
     )
@@ -280,7 +290,7 @@ def audit_projectors(plan: RigPlan) -> tuple[AuditProjector, ...]:
 def audit_cameras(plan: RigPlan) -> tuple[AuditCamera, ...]:
     """Return the plan's cameras."""
     return tuple(
-        AuditCamera(c.device, c.world_from_device, bodies_but(plan, c))
+        AuditCamera(c.device, c.world_from_device, bodies_but(plan, c), c.station)
         for c in plan.cameras
     )
 

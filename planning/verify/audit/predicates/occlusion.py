@@ -16,8 +16,7 @@ from scipy.optimize import lsq_linear
 from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
-from planning.model.bodies import Box
-from planning.model.obstacles import Obstacle
+from planning.model.bodies import Box, Obstacle
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
 

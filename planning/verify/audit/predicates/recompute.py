@@ -176,13 +176,22 @@ def reachable_by(
         samples = actual.samples.take(chosen)
         return light_steps(projector, samples, requirements.projector, shadow)
 
+    others = reference_projectors(plan)
+
     def measures(camera: AuditCamera, chosen: Ints) -> Steps:
         samples, lit_by = actual.samples.take(chosen), actual.lit_by[:, chosen]
-        steps = pairs_with(camera, projectors, samples, lit_by, requirements, shadow)
+        lights = projectors
+        if camera.station:
+            # One of a reference head: with the light of that head alone.
+            lights = tuple(p for p in others if p.station == camera.station)
+            limits = requirements.projector
+            light = [light_steps(p, samples, limits, shadow) for p in lights]
+            lit_by = np.stack(light) == LIT
+        steps = pairs_with(camera, lights, samples, lit_by, requirements, shadow)
         return steps.max(axis=0, initial=0)
 
     beyond = actual.lit & ~actual.measured
-    light = _furthest(reference_projectors(plan), lights, ~actual.lit, LIT, rng)
+    light = _furthest(others, lights, ~actual.lit, LIT, rng)
     pair = _furthest(reference_cameras(plan), measures, beyond, MEASURED, rng)
     by_cameras = actual.measured | (pair == MEASURED)
     pair[actual.measured] = MEASURED
@@ -216,8 +225,13 @@ def pairs_with(
     limits: Requirements,
     shadow: Shadow,
 ) -> Steps:
-    """Return `Recomputed.pairs` of one camera, on samples lit as `lit_by` says."""
+    """Return `Recomputed.pairs` of one camera, on samples lit as `lit_by` says.
+
+    Projectors that it doesn't measure with are taken to light nothing.
+    """
     sight = sight_steps(camera, samples, limits.camera, shadow)
+    with_it = np.array([camera.works_with(projector) for projector in projectors])
+    lit_by = lit_by & with_it[:, None]
     pairs = np.where(lit_by, sight, np.int8(_NOT_LIT))
     for p, projector in enumerate(projectors):
         both = np.flatnonzero(lit_by[p] & (sight == SEEN))

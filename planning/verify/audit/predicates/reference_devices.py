@@ -21,14 +21,28 @@ def reference_projectors(plan: RigPlan) -> tuple[AuditProjector, ...]:
         surface.models_of("projector"),
         strict=True,
     )
+    stations = _stations(plan, len(surface.reference_projectors))
     return tuple(
         AuditProjector(
             *(devices[model], pose, ring, last),
             bodies_about(plan, "projector", pose),
             code=plan.projectors[0].code,
+            station=station,
         )
-        for pose, ring, model in poses
+        for station, (pose, ring, model) in zip(stations, poses, strict=True)
     )
+
+
+def _stations(plan: RigPlan, n_devices: int) -> list[str]:
+    """Names of the reference heads that so many devices belong to, one head's first.
+
+    Empty where the plan has none: then each reference device measures with any.
+    """
+    stations = plan.document.stations
+    heads = 0 if stations is None else stations.n_reference
+    if not heads:
+        return [""] * n_devices
+    return [f"reference {k * heads // n_devices}" for k in range(n_devices)]
 
 
 def _optics(plan: RigPlan, kind: str) -> list[PinholeModel | ParallelModel]:
@@ -44,7 +58,8 @@ def reference_cameras(plan: RigPlan) -> tuple[AuditCamera, ...]:
         return ()
     devices, surface = _optics(plan, "camera"), plan.surface
     poses = zip(surface.reference_cameras, surface.models_of("camera"), strict=True)
+    stations = _stations(plan, len(surface.reference_cameras))
     return tuple(
-        AuditCamera(devices[model], pose, bodies_about(plan, "camera", pose))
-        for pose, model in poses
+        AuditCamera(devices[model], pose, bodies_about(plan, "camera", pose), station)
+        for station, (pose, model) in zip(stations, poses, strict=True)
     )

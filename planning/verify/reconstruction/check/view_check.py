@@ -130,7 +130,9 @@ def merge_views(cloud: Cloud, plan: Scanner) -> Merged:
     The second camera of a pair stands for what lights a dense code: pairs with another
     one are others, whose noise is their own.
     """
-    by_pair = replace(cloud, projector=cloud.by_camera, ring=np.full_like(cloud.ring, -1))
+    by_pair = replace(
+        cloud, projector=cloud.by_camera, ring=np.full_like(cloud.ring, -1)
+    )
     found = merge_dense(by_pair, plan, cell_m=plan.limits.dense.spacing_m)
     kept = replace(
         found.cloud,

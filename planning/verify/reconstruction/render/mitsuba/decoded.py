@@ -37,6 +37,8 @@ def decode_path_traced(
                 images = tracer.frames(plan, p, seed=seed)
             for camera, frames in images:
                 pair = (p, names[camera])
+                if pair not in pairs:
+                    continue
                 patterns = projector.pattern_for(plan.cameras[pair[1]])
                 with spent.on("decode"):
                     found[pair] = decode(

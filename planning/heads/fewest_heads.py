@@ -1,0 +1,204 @@
+"""The search for the fewest heads, until samples that are fresh confirm them."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from geometry.arrays import Ints
+from planning.scene.draws import DRAWS
+from planning.scene.scene import Scene
+from solvers import solve_cover, solve_max_coverage
+
+from .head_cover import HeadCover, HeadSets
+from .head_poses import HeadSource, PlacedHead
+
+_ROUNDS = 4
+# Of fresh samples that don't confirm a cover one in so many joins those of the next.
+_JOINING = 3
+# Of a lattice's spacing: how far around a head it is moved, round by round.
+_SCALES = (1.0, 0.5, 0.25)
+_BUDGET = 2e9
+
+
+@dataclass(frozen=True, eq=False)
+class FoundHeads:
+    """The fewest heads of the candidates, and what is proved of their number.
+
+    Attributes:
+        heads: All candidates.
+        cover: What is asked of them.
+        chosen: Those taken, at most as many as are allowed, (k,).
+        needed: So many are enough, allowed or not.
+        lower_bound: Proven least number of the candidates.
+        proof: What proves it.
+        greedy: As many a greedy choice takes; None: it never gets there.
+    """
+
+    heads: tuple[PlacedHead, ...]
+    cover: HeadCover
+    chosen: Ints
+    needed: int
+    lower_bound: int
+    proof: str
+    greedy: int | None
+
+    @property
+    def met(self) -> bool:
+        """Whether those taken are enough for the samples."""
+        return self.cover.lacking(self.chosen) == 0
+
+    def with_one_more(self, scene: Scene) -> "FoundHeads":
+        """Return one head more: the best of so many, or that which adds most."""
+        count, problem = len(self.chosen) + 1, self.cover.problem
+        more = solve_max_coverage(
+            *(problem, count), warm_start=self.chosen, seed=scene.seed, budget=_BUDGET
+        )
+        return replace(self, chosen=more.selected)
+
+    @property
+    def taken(self) -> tuple[PlacedHead, ...]:
+        """The heads chosen."""
+        return tuple(self.heads[k] for k in self.chosen)
+
+
+def fewest_heads(
+    source: HeadSource, n: int, most: int, *, least: int = 1
+) -> FoundHeads:
+    """Return the fewest heads of about n poses and of others close around.
+
+    Args:
+        source: Gives poses.
+        n: Poses of the lattice.
+        most: Heads allowed.
+        least: So many are needed anyway; no fewer are looked for.
+    """
+    scene, heads = source.scene, source.over(n)
+    sets = HeadSets.of(scene, heads, scene.target_samples(DRAWS.cameras))
+    for draw in range(_ROUNDS):
+        heads, sets, found = _with_fewer(source, heads, sets, n, most, least)
+        fresh = scene.target_samples(DRAWS.fresh_cameras.later(1 + draw))
+        again = HeadSets.of(scene, heads, fresh)
+        met = found.needed <= most
+        if not met or not HeadCover.of(scene, again).lacking(found.chosen):
+            break
+        some = np.arange(0, len(fresh), _JOINING)
+        part = HeadSets(fresh.take(some), again.lit[some], again.measured[some])
+        sets = sets.with_samples(part)
+    return found
+
+
+def _with_fewer(
+    source: HeadSource,
+    heads: tuple[PlacedHead, ...],
+    sets: HeadSets,
+    n: int,
+    most: int,
+    least: int,
+) -> tuple[tuple[PlacedHead, ...], HeadSets, FoundHeads]:
+    """Return the fewest of heads, and of others around as long as they save one."""
+    while True:
+        found = _fewest_of(source, heads, sets, most)
+        if found.needed <= max(least, 1):
+            return heads, sets, found
+        moved = _moved_together(source, found, n, found.needed - 1)
+        if moved is None:
+            return heads, sets, found
+        heads = heads + moved
+        sets = sets.beside(HeadSets.of(source.scene, moved, sets.target))
+
+
+def _fewest_of(
+    source: HeadSource, heads: tuple[PlacedHead, ...], sets: HeadSets, most: int
+) -> FoundHeads:
+    """Return the fewest of some heads whose housings don't collide.
+
+    Of two that do, the one that measures less isn't offered again; the bound is of any.
+    """
+    cover, seed = HeadCover.of(source.scene, sets), source.scene.seed
+    first = solution = solve_cover(cover.problem, seed=seed, budget=_BUDGET)
+    while True:
+        chosen, needed = solution.selected, len(solution.selected)
+        if needed > most:
+            few = solve_max_coverage(cover.problem, most, seed=seed, budget=_BUDGET)
+            chosen = few.selected
+        pair = source.colliding([heads[k] for k in chosen])
+        if pair is None:
+            break
+        measured = sets.measured[:, chosen].sum(axis=0)
+        worse = chosen[min(pair, key=lambda k: (measured[k], k))]
+        cover = cover.without(int(worse))
+        solution = solve_cover(cover.problem, seed=seed, budget=_BUDGET)
+    bound = min(needed, int(np.ceil(first.lower_bound - 1e-9)))
+    return FoundHeads(heads, cover, chosen, needed, bound, first.proof, _greedy(cover))
+
+
+def _moved_together(
+    source: HeadSource, found: FoundHeads, n: int, count: int
+) -> tuple[PlacedHead, ...] | None:
+    """Return so many heads that are enough, moved from those that nearly are.
+
+    One after the other takes the pose around it with which least is lacking.
+    """
+    scene, cover = source.scene, found.cover
+    few = solve_max_coverage(cover.problem, count, seed=scene.seed, budget=_BUDGET)
+    heads = [found.heads[k] for k in few.selected]
+    sets = cover.sets.take(few.selected)
+    everywhere = replace(cover, sets=sets)
+    lacking = everywhere.lacking(np.arange(len(heads)))
+    for scale in _SCALES:
+        for k in range(len(heads)):
+            scene.check_cancelled()
+            around = source.around(heads[k], n, scale)
+            if not around:
+                continue
+            offered = HeadSets.of(scene, around, cover.sets.target)
+            others = sets.take(np.delete(np.arange(len(heads)), k))
+            short = _lacking_with_each(cover, others, offered)
+            best = int(np.argmin(short))
+            if short[best] < lacking:
+                lacking, heads[k] = int(short[best]), around[best]
+                sets = _with_at(sets, k, offered.take(np.array([best])))
+            if lacking == 0 and source.colliding(heads) is None:
+                return tuple(heads)
+    return None
+
+
+def _with_at(sets: HeadSets, k: int, one: HeadSets) -> HeadSets:
+    """Return sets with another head in the place of one."""
+    lit, measured = sets.lit.copy(), sets.measured.copy()
+    lit[:, k], measured[:, k] = one.lit[:, 0], one.measured[:, 0]
+    return replace(sets, lit=lit, measured=measured)
+
+
+def _lacking_with_each(cover: HeadCover, others: HeadSets, offered: HeadSets) -> Ints:
+    """Return how many rows are lacking of other heads and each one offered, (k,)."""
+    both = replace(cover, sets=others.beside(offered))
+    n = others.lit.shape[1]
+    fixed, covers = np.arange(n), both.covers
+    rows, floors = cover.quotas.regions.row, cover.quotas.floors
+    served = covers[:, fixed].any(axis=1)[:, None] | covers[:, n:]
+    counts = np.stack(
+        [
+            np.bincount(rows, weights=column, minlength=len(floors))
+            for column in served.T
+        ]
+    )
+    return np.clip(floors - counts, 0, None).sum(axis=1).astype(np.int64)
+
+
+def _greedy(cover: HeadCover) -> int | None:
+    """Return how many heads are taken, each that adds most to what is lacking."""
+    rows, floors = cover.quotas.regions.row, cover.quotas.floors.astype(np.int64)
+    covers, served = cover.covers, np.zeros(len(cover.rows), dtype=bool)
+    count = 0
+    while True:
+        have = np.bincount(rows[served], minlength=len(floors))
+        short = floors - have
+        if not (short > 0).any():
+            return count
+        wanted = ~served & (short > 0)[rows]
+        gains = covers[wanted].sum(axis=0)
+        if not gains.any():
+            return None
+        served |= covers[:, int(np.argmax(gains))]
+        count += 1

@@ -1,0 +1,1 @@
+"""Tables of rig files that stand alone: patterns, sensor heads, turntables."""

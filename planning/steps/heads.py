@@ -1,0 +1,140 @@
+"""A plan of sensor heads, from the candidates to what is written."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from planning.heads.fewest_heads import FoundHeads, fewest_heads
+from planning.heads.head_poses import HeadSource, PlacedHead, widened
+from planning.heads.head_stage import least_by_light, stages_of
+from planning.heads.tour import shortest_way
+from planning.model.document.station_records import StationCount, StationsRecord
+from planning.model.errors import InfeasibleLimitsError
+from planning.model.heads import Head
+from planning.model.plan import RigPlan
+from planning.model.progress import Stopwatch
+from planning.model.words import count_words
+from planning.proofs import projector_bound
+from planning.report.assemble import write_plan
+from planning.report.entries.station_entries import Placement, Stationed
+from planning.report.partial_plan import PartialPlan, PlanRequest, Prepared
+
+from .prepare import prepared
+from .stages import short_of
+
+
+def planned_heads(
+    request: PlanRequest, clock: Stopwatch
+) -> tuple[RigPlan, PartialPlan]:
+    """Return the fewest heads, or stations of one; one more where fresh samples ask.
+
+    Raises:
+        InfeasibleLimitsError: If no head measures anything.
+    """
+    head, most = request.rig.head, request.wishes.max_heads
+    assert head is not None
+    assert most is not None
+    ready = prepared(request, clock)
+    space = ready.scene.requirements.workspace
+    ready = replace(ready, scene=ready.scene.within(widened(space, head)))
+    source = HeadSource(
+        *(ready.scene, head, space, ready.templates, ready.cameras),
+        carried=request.rig.stations is not None,
+    )
+    found, everywhere = _fewest(ready, source, most, clock)
+    while True:
+        partial = _placed(ready, head, found, everywhere, clock)
+        plan = write_plan(partial, clock)
+        count = len(found.chosen)
+        if not any(short_of(plan)) or found.needed > most or count >= most:
+            return plan, partial
+        clock.say(f"  fresh samples fall short: {count_words(count + 1, 'head')}")
+        found = found.with_one_more(ready.scene)
+
+
+def _fewest(
+    ready: Prepared, source: HeadSource, most: int, clock: Stopwatch
+) -> tuple[FoundHeads, int | None]:
+    request, scene = ready.request, ready.scene
+    with clock.stage("heads", "heads: candidates and cover"):
+        found = fewest_heads(source, request.rig.n_projector_poses, most)
+        if not found.cover.sets.measured.any():
+            raise InfeasibleLimitsError(
+                f"no head of {len(found.heads)} poses measures any part of the target; "
+                f"widen placement.standoff_play_mm, or the limits of the rig"
+            )
+        clock.say(
+            f"  {len(found.chosen)} of {len(found.heads)} candidates; at least "
+            f"{found.lower_bound} are needed"
+        )
+    with clock.stage("bounds", "bounds over all poses of the workspace"):
+        effort = projector_bound.PROVE if request.prove else projector_bound.DEFAULT
+        everywhere = least_by_light(scene, found.heads, ready.templates, effort)
+    return found, everywhere
+
+
+def _placed(
+    ready: Prepared,
+    head: Head,
+    found: FoundHeads,
+    everywhere: int | None,
+    clock: Stopwatch,
+) -> PartialPlan:
+    """Devices of the heads chosen, in the order in which they measure."""
+    carried = ready.request.rig.stations is not None
+    heads, way = _in_order(found.taken, carried=carried)
+    letter = "S" if carried else "H"
+    names = [f"{letter}{k + 1}" for k in range(len(heads))]
+    placements = tuple(
+        Placement(name, one.world_from_head, len(one.projectors), len(one.cameras))
+        for name, one in zip(names, heads, strict=True)
+    )
+    planned = [
+        one.named("" if head.cross else name)
+        for name, one in zip(names, heads, strict=True)
+    ]
+    reference = [one.named(f"reference {k}") for k, one in enumerate(found.heads)]
+    with clock.stage("heads", "heads: what their devices light and measure"):
+        lights, views = stages_of(ready.scene, planned, reference)
+    asked = found.cover.asked
+    count = StationCount(
+        count=len(heads),
+        needed=max(found.needed, len(heads)) if found.met else found.needed,
+        lower_bound=found.lower_bound,
+        n_candidates=len(found.heads),
+        n_samples=len(found.cover.sets.target),
+        lit=asked[0],
+        measured=asked[1],
+        proof=found.proof,
+        everywhere=everywhere,
+        greedy=found.greedy,
+    )
+    record = StationsRecord(
+        kind="stations" if carried else "heads",
+        head=head.name,
+        cross=head.cross,
+        stations=(),
+        n_reference=len(planned) + len(reference),
+        count=count,
+        **({} if way is None else {"way_m": way}),
+    )
+    return PartialPlan(
+        ready,
+        lights,
+        lights.projectors,
+        views,
+        views.cameras,
+        axes=None,
+        stationed=Stationed(placements, record),
+    )
+
+
+def _in_order(
+    heads: Sequence[PlacedHead], *, carried: bool
+) -> tuple[list[PlacedHead], float | None]:
+    """Heads in the order of the shortest way between them, if one head is carried."""
+    if not carried:
+        return list(heads), None
+    order, way = shortest_way(np.stack([h.world_from_head[:3, 3] for h in heads]))
+    return [heads[k] for k in order], way

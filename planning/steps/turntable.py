@@ -1,0 +1,219 @@
+"""A plan of devices before a turntable, from their places to what is written."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from geometry.arrays import Array
+from planning.heads.head_poses import PlacedHead
+from planning.heads.head_stage import stages_of
+from planning.model.device_poses import moved_to
+from planning.model.document.station_records import (
+    StationCount,
+    StationsRecord,
+    TradeRow,
+)
+from planning.model.errors import InfeasibleLimitsError
+from planning.model.plan import RigPlan
+from planning.model.progress import Stopwatch
+from planning.model.words import count_words
+from planning.report.assemble import write_plan
+from planning.report.entries.station_entries import Placement, Stationed
+from planning.report.partial_plan import PartialPlan, PlanRequest, Prepared
+from planning.scene.draws import DRAWS
+from planning.scene.scene import Scene
+from planning.turntable.fewest_steps import Steps, StepSearch, pairs_of_counts
+from planning.turntable.table_lattice import TableLattice, about_axis
+from planning.turntable.table_sets import TableSets
+
+from .prepare import prepared
+from .stages import short_of
+
+# Numbers of either device that steps are looked for, at most.
+_MOST_LAMPS, _MOST_EYES = 2, 3
+# Shares that are asked of samples beyond what is required, until fresh ones confirm it.
+_SPARE = (0.0, 0.01, 0.02, 0.04)
+
+
+@dataclass(frozen=True, eq=False)
+class _Traded:
+    """The fewest steps for each number of devices, and which of these is taken."""
+
+    rows: tuple[TradeRow, ...]
+    taken: tuple[int, int]
+    steps: Steps
+    most: int
+
+
+def planned_on_turntable(
+    request: PlanRequest, clock: Stopwatch
+) -> tuple[RigPlan, PartialPlan]:
+    """Return the fewest devices, or steps, and one look further where it falls short.
+
+    With a number of cameras given, as few steps as that many devices allow; else as few
+    devices as measure enough at all.
+
+    Raises:
+        InfeasibleLimitsError: If the devices allowed measure too little at any angle.
+    """
+    ready = prepared(request, clock)
+    table = request.rig.turntable
+    assert table is not None
+    space = ready.scene.requirements.workspace
+    table = table.moved(space.origin_m)
+    scene = ready.scene.within(about_axis(space, table))
+    lattice = TableLattice.about(table, space, ready.templates, ready.cameras)
+    with clock.stage("turntable", "turntable: what pairs measure at every angle"):
+        sets = TableSets.of(scene, lattice, scene.target_samples(DRAWS.cameras))
+    search = StepSearch.of(scene, sets)
+    with clock.stage("turntable", "turntable: the fewest devices and steps"):
+        traded = _traded(search, request, clock)
+    steps = traded.steps
+    for spare in _SPARE:
+        if spare:
+            clock.say("  fresh samples fall short: more is asked of the others")
+            asked = StepSearch.of(_asking_more(scene, spare), sets)
+            steps = asked.fewest(*traded.taken, traded.most)[0] or steps
+        partial = _placed(ready, search, traded, steps, clock)
+        plan = write_plan(partial, clock)
+        if not any(short_of(plan)):
+            break
+    return plan, partial
+
+
+def _traded(search: StepSearch, request: PlanRequest, clock: Stopwatch) -> _Traded:
+    """The fewest steps of each number of devices, and what is taken of them."""
+    table, wishes = search.sets.lattice.table, request.wishes
+    most = table.max_steps or search.sets.lattice.n_places
+    lamps = min(wishes.max_projectors, _MOST_LAMPS)
+    eyes = min(wishes.max_cameras or _MOST_EYES, _MOST_EYES)
+    rows: list[TradeRow] = []
+    found: dict[tuple[int, int], Steps] = {}
+    for pair in pairs_of_counts(lamps, eyes):
+        steps, least = search.fewest(*pair, most)
+        rows.append(
+            TradeRow(
+                projectors=pair[0],
+                cameras=pair[1],
+                steps=None if steps is None else len(steps.angles),
+                lower_bound=least,
+            )
+        )
+        if steps is not None:
+            found[pair] = steps
+            clock.say(
+                f"  {count_words(pair[0], 'projector')} and "
+                f"{count_words(pair[1], 'camera')}: "
+                f"{count_words(len(steps.angles), 'step')}, at least {least}"
+            )
+    if not found:
+        raise InfeasibleLimitsError(
+            f"no {count_words(lamps, 'projector')} and {count_words(eyes, 'camera')} "
+            f"measure enough of the part at {most} angles of the table; allow more "
+            f"devices or steps, or another axis"
+        )
+    if wishes.max_cameras is None:
+        taken = next(iter(found))
+    else:
+        taken = min(found, key=lambda pair: (len(found[pair].angles), sum(pair)))
+    return _Traded(tuple(rows), taken, found[taken], most)
+
+
+def _asking_more(scene: Scene, spare: float) -> Scene:
+    required = scene.requirements
+    shares = {
+        name: min(1.0, getattr(required, name) + spare)
+        for name in ("coverage", "dominant_coverage", "region_coverage")
+        if getattr(required, name)
+    }
+    return replace(scene, requirements=replace(required, **shares))
+
+
+def _placed(
+    ready: Prepared,
+    search: StepSearch,
+    traded: _Traded,
+    steps: Steps,
+    clock: Stopwatch,
+) -> PartialPlan:
+    """The devices at every step, as the part sees them."""
+    lattice = search.sets.lattice
+    room = _room(lattice, steps)
+    planned: list[PlacedHead] = []
+    placements: list[Placement] = []
+    for k, place in enumerate(steps.angles.tolist()):
+        angle = lattice.angle(place)
+        back = lattice.table.turn(-angle)
+        planned.append(_turned(room, back).named(f"T{k + 1}"))
+        counts = len(room.projectors), len(room.cameras)
+        placements.append(Placement(f"T{k + 1}", back, *counts, angle))
+    required = search.scene.requirements
+    scene = replace(
+        search.scene,
+        requirements=replace(
+            required,
+            max_projectors=len(placements) * len(room.projectors),
+            max_cameras=len(placements) * len(room.cameras),
+        ),
+    )
+    with clock.stage("turntable", "turntable: what the devices light and measure"):
+        lights, views = stages_of(scene, planned, [_everything(lattice)])
+    record = StationsRecord(
+        kind="turntable",
+        stations=(),
+        count=_count(search, traded, steps),
+        point_m=lattice.table.point_m,
+        axis=lattice.table.axis,
+        steps=traded.rows,
+    )
+    return PartialPlan(
+        replace(ready, scene=scene),
+        lights,
+        lights.projectors,
+        views,
+        views.cameras,
+        axes=None,
+        stationed=Stationed(tuple(placements), record),
+    )
+
+
+def _room(lattice: TableLattice, steps: Steps) -> PlacedHead:
+    """The devices as they stand in the room, which the part sees so at angle 0."""
+    return PlacedHead(
+        np.eye(4),
+        tuple(lattice.placed(lattice.projectors[e], i) for e, i in steps.lamps),
+        tuple(lattice.placed(lattice.cameras[f], k) for f, k in steps.eyes),
+    )
+
+
+def _turned(room: PlacedHead, back: Array) -> PlacedHead:
+    """Devices as the part sees them when the table has turned."""
+    return PlacedHead(
+        back,
+        tuple(moved_to(p, back @ p.world_from_device) for p in room.projectors),
+        tuple(moved_to(c, back @ c.world_from_device) for c in room.cameras),
+    )
+
+
+def _everything(lattice: TableLattice) -> PlacedHead:
+    """Every place of the lattice, as the set that what can be reached refers to."""
+    places = range(lattice.n_places)
+    return PlacedHead(
+        np.eye(4),
+        tuple(lattice.placed(p, k) for p in lattice.projectors for k in places),
+        tuple(lattice.placed(c, k) for c in lattice.cameras for k in places),
+    )
+
+
+def _count(search: StepSearch, traded: _Traded, steps: Steps) -> StationCount:
+    asked, n = search.cover.asked, len(steps.angles)
+    return StationCount(
+        count=n,
+        needed=n,
+        lower_bound=traded.steps.lower_bound,
+        n_candidates=search.sets.lattice.n_places,
+        n_samples=len(search.sets.target),
+        lit=asked[0],
+        measured=asked[1],
+        proof=traded.steps.proof,
+    )

@@ -1,0 +1,1 @@
+"""Turntables: devices before a part that turns, and the angles it is measured at."""

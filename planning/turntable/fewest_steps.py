@@ -1,0 +1,319 @@
+"""The fewest steps of a turntable, for so many projectors and cameras before it.
+
+The place of the first projector on its circle is free: turn the table, and any other is
+as good. So for k = 1, 2, ... all sets J of k angles are looked at for all places of one
+or two projectors: those that light too little, or where even all cameras together
+measure too little, are left out; for the others the places of cameras are tried, one,
+two or three at once. What is found first takes the fewest steps of all places of the
+lattice, and the search is the proof. Where it was cut the bound leaves out who pairs
+with whom::
+
+    steps >= ceil(K / P),  K the fewest pairs of place and angle that any cameras serve
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations, combinations_with_replacement, product
+from math import comb
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.arrays import Ints
+from planning.heads.head_cover import HeadCover
+from planning.scene.placed_bodies import Device
+from planning.scene.scene import Scene
+from solvers import solve_cover
+
+from .table_sets import Place, TableSets
+
+_BUDGET = 2e8
+# Sets of angles at most that are looked at, for all places of as many projectors, and
+# of which cameras are tried; of more the number isn't proved.
+_ALL, _TRIED = 20_000_000, 4000
+_AT_ONCE = 20_000
+_SEARCHED = "every choice of places and angles"
+_SERVED = "what any cameras serve at a step"
+
+_Bits = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """Places of devices, and the angles at which they measure.
+
+    Attributes:
+        lamps: Places of the projectors, `eyes` of the cameras, in the room.
+        angles: Chosen ones, as places of the table, ascending, (k,).
+        lower_bound: Proven least number of angles for as many devices, wherever on the
+            lattice they are.
+        proof: What proves it.
+    """
+
+    lamps: tuple[Place, ...]
+    eyes: tuple[Place, ...]
+    angles: Ints
+    lower_bound: int
+    proof: str
+
+
+@dataclass(frozen=True, eq=False)
+class _Circle:
+    """What a projector at place 0 of its circle does at each angle, as bits of samples.
+
+    Attributes:
+        lit: Shape (A, b).
+        anyone: What any cameras measure with it, shape (A, b).
+        measured: What a camera does, by its place, shape (A, b) each.
+    """
+
+    lit: _Bits
+    anyone: _Bits
+    measured: dict[Place, _Bits]
+
+    @classmethod
+    def of(cls, sets: TableSets, e: int) -> "_Circle":
+        """Return what the projector of a circle does."""
+        lamp = ((e, 0),)
+        return cls(
+            _packed(sets.steps_of(lamp, ()).lit),
+            _packed(sets.steps_of(lamp, None).measured),
+            {
+                eye: _packed(sets.steps_of(lamp, (eye,)).measured)
+                for eye in sets.near(lamp[0])
+            },
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class StepSearch:
+    """Looks for the fewest steps of a lattice's places.
+
+    Attributes:
+        scene: What is asked.
+        sets: What pairs of places do.
+        cover: What is asked, as rows; its sets are those of everything.
+    """
+
+    scene: Scene
+    sets: TableSets
+    cover: HeadCover
+
+    @classmethod
+    def of(cls, scene: Scene, sets: TableSets) -> "StepSearch":
+        """Return the search for what a scene asks."""
+        return cls(scene, sets, HeadCover.of(scene, sets.everywhere()))
+
+    def fewest(self, n_lamps: int, n_eyes: int, most: int) -> tuple[Steps | None, int]:
+        """Return the fewest steps for so many devices, and what is proved of them.
+
+        None: at most so many steps weren't found to be enough.
+        """
+        least, refuted = self._least(n_lamps, most), n_lamps <= 2
+        for count in range(least, most + 1):
+            found, whole = self._at(n_lamps, count, n_eyes)
+            if found is not None:
+                proof = _SEARCHED if refuted else _SERVED
+                return replace(found, lower_bound=least, proof=proof), least
+            refuted &= whole
+            if refuted:
+                least = count + 1
+        return None, least
+
+    def _least(self, n_lamps: int, most: int) -> int:
+        """Fewest steps of so many projectors with any cameras at any place."""
+        every = [self.sets.steps_of([(e, 0)], None) for e in range(self._n_circles)]
+        together = every[0]
+        for one in every[1:]:
+            together = together.beside(one)
+        cover = replace(self.cover, sets=together)
+        if cover.lacking(np.arange(together.lit.shape[1])):
+            return most + 1
+        solution = solve_cover(cover.problem, seed=self.scene.seed, budget=_BUDGET)
+        return -(-int(np.ceil(solution.lower_bound - 1e-9)) // n_lamps)
+
+    def _at(self, n_lamps: int, count: int, n_eyes: int) -> tuple[Steps | None, bool]:
+        """A choice of so many angles that is enough, and whether all were looked at.
+
+        Of each choice of projectors those of most that any cameras measure come first.
+        """
+        looked, tried = 0, 0
+        for lamps in self._lamps(n_lamps):
+            self.scene.check_cancelled()
+            angles = self._angles(lamps, count)
+            looked += comb(self.sets.lattice.n_places, count)
+            for row in angles:
+                tried += 1
+                near, bits = self._measured(lamps, row)
+                for chosen in _together(bits, n_eyes, self.cover.asked[1]):
+                    eyes = tuple(near[k] for k in chosen)
+                    if (found := self._stands(lamps, eyes, row)) is not None:
+                        return found, True
+                if tried >= _TRIED:
+                    return None, False
+            if looked >= _ALL:
+                return None, False
+        return None, True
+
+    def _angles(self, lamps: tuple[Place, ...], count: int) -> Ints:
+        """Sets of angles (m, count) that light enough and where any cameras measure it.
+
+        Those where they measure most come first.
+        """
+        lit, measured = self.cover.asked
+        light, anyone = (
+            np.bitwise_or.reduce([np.roll(bits, i, axis=0) for bits, i in each])
+            for each in (
+                [(self._circles[e].lit, i) for e, i in lamps],
+                [(self._circles[e].anyone, i) for e, i in lamps],
+            )
+        )
+        kept: list[Ints] = []
+        held: list[Ints] = []
+        for part in _subsets(len(light), count):
+            part = part[_count(_joined(light, part)) >= lit]
+            counts = _count(_joined(anyone, part))
+            kept.append(part[counts >= measured])
+            held.append(counts[counts >= measured])
+        order = np.argsort(-np.concatenate(held), kind="stable")
+        return np.concatenate(kept)[order]
+
+    def _measured(
+        self, lamps: tuple[Place, ...], angles: Ints
+    ) -> tuple[list[Place], _Bits]:
+        """Places of cameras, and what each measures at angles with them, (n, b)."""
+        places, n_bytes = self.sets.lattice.n_places, self._circles[0].lit.shape[1]
+        every: dict[Place, _Bits] = {}
+        for e, i in lamps:
+            for (f, k), bits in self._circles[e].measured.items():
+                own = np.bitwise_or.reduce(bits[(angles - i) % places], axis=0)
+                at = f, (k + i) % places
+                every[at] = every[at] | own if at in every else own
+        rows = np.array(list(every.values()), dtype=np.uint8)
+        return list(every), rows.reshape(-1, n_bytes)
+
+    def _stands(
+        self, lamps: tuple[Place, ...], eyes: tuple[Place, ...], angles: Ints
+    ) -> Steps | None:
+        """Places in the room, if it holds them and floors of regions are met, too."""
+        lattice = self.sets.lattice
+        devices: list[tuple[Device, int]] = [
+            *((lattice.projectors[e], i) for e, i in lamps),
+            *((lattice.cameras[f], k) for f, k in eyes),
+        ]
+        begins = lattice.begins(devices)
+        cover = replace(self.cover, sets=self.sets.steps_of(lamps, eyes))
+        if not len(begins) or cover.lacking(angles):
+            return None
+        # Devices that stand by so much further on see the same at angles as much on.
+        from_zero = np.isin(begins, -angles % lattice.n_places)
+        by = int(begins[np.argmax(from_zero)])
+        return Steps(
+            _moved(lamps, by, lattice.n_places),
+            _moved(eyes, by, lattice.n_places),
+            np.sort((angles + by) % lattice.n_places),
+            1,
+            "",
+        )
+
+    @cached_property
+    def _circles(self) -> list[_Circle]:
+        return [_Circle.of(self.sets, e) for e in range(self._n_circles)]
+
+    @cached_property
+    def _n_circles(self) -> int:
+        return len(self.sets.lattice.projectors)
+
+    def _lamps(self, count: int) -> Iterator[tuple[Place, ...]]:
+        """Yield places of projectors, all of one or two of them.
+
+        Of more those that light most, found one after another.
+        """
+        circles, places = range(self._n_circles), self.sets.lattice.n_places
+        if count == 1:
+            yield from (((e, 0),) for e in circles)
+            return
+        if count == 2:
+            for e, f in combinations_with_replacement(circles, 2):
+                # On one circle half a turn is as good as the other half.
+                turn = places // 2 + 1 if e == f else places
+                yield from (((e, 0), (f, i)) for i in range(e == f, turn))
+            return
+        chosen: tuple[Place, ...] = ()
+        while len(chosen) < count:
+            every = product(circles, range(places))
+            others = [one for one in every if one not in chosen]
+            light = [self._light((*chosen, one)) for one in others]
+            chosen = (*chosen, others[int(np.argmax(light))])
+        yield chosen
+
+    def _light(self, lamps: tuple[Place, ...]) -> float:
+        """How much projectors light at all angles together, then on average."""
+        lit = self.sets.steps_of(lamps, ()).lit
+        return float(lit.any(axis=1).sum()) + float(lit.mean())
+
+
+def _packed(rows: NDArray[np.bool_]) -> _Bits:
+    return np.packbits(rows.T, axis=1)
+
+
+def _joined(bits: _Bits, sets: Ints) -> _Bits:
+    """What sets (m, k) of rows (A, b) hold together, (m, b)."""
+    together = np.zeros((len(sets), bits.shape[1]), dtype=np.uint8)
+    for column in sets.T:
+        together |= bits[column]
+    return together
+
+
+def _count(bits: _Bits) -> Ints:
+    return np.bitwise_count(bits).sum(axis=-1, dtype=np.int64)
+
+
+def _subsets(n: int, count: int) -> Iterator[Ints]:
+    """Yield all sets of so many of n, many at once, (m, count)."""
+    every = combinations(range(n), count)
+    while True:
+        part = [one for one, _ in zip(every, range(_AT_ONCE), strict=False)]
+        if not part:
+            return
+        yield np.array(part, dtype=np.int64)
+
+
+def _together(bits: _Bits, count: int, asked: int) -> Iterator[tuple[int, ...]]:
+    """Yield which rows (n, b), one to three at once, hold enough; the most first."""
+    n = len(bits)
+    if count == 1:
+        held = _count(bits)
+        for k in np.argsort(-held, kind="stable"):
+            if held[k] < asked:
+                return
+            yield (int(k),)
+        return
+    alone = _count(bits)
+    best = int(alone.max(initial=0))
+    found: list[tuple[int, tuple[int, ...]]] = []
+    for k in range(n - count + 1):
+        if alone[k] + (count - 1) * best < asked:
+            continue
+        joined = bits[k] | bits[k + 1 :]
+        if count == 2:
+            held = _count(joined)
+            good = np.flatnonzero(held >= asked)
+            found += [(-int(held[j]), (k, k + 1 + int(j))) for j in good]
+            continue
+        for rest in _together(joined, count - 1, asked):
+            held = int(_count(np.bitwise_or.reduce(joined[list(rest)])))
+            found.append((-held, (k, *(k + 1 + j for j in rest))))
+    for _, chosen in sorted(found):
+        yield chosen
+
+
+def _moved(at: tuple[Place, ...], by: int, n_places: int) -> tuple[Place, ...]:
+    return tuple((circle, (place + by) % n_places) for circle, place in at)
+
+
+def pairs_of_counts(most_lamps: int, most_eyes: int) -> list[tuple[int, int]]:
+    """Return numbers of projectors and cameras, fewest devices first."""
+    every = product(range(1, most_lamps + 1), range(1, most_eyes + 1))
+    return sorted(every, key=lambda pair: (sum(pair), pair))

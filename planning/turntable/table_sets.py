@@ -1,0 +1,108 @@
+"""What pairs about a turntable measure of the part, at every angle of the table."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from geometry.arrays import Mask
+from planning.heads.head_cover import HeadSets
+from planning.scene.camera_views import camera_views
+from planning.scene.lighting import lit_stages
+from planning.scene.limits.projector_limits import LIT
+from planning.scene.measured import LitSamples, measured_by
+from planning.scene.samples import Target
+from planning.scene.scene import Scene
+
+from .table_lattice import TableLattice
+
+# Of each device its circle and its place.
+Place = tuple[int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class TableSets:
+    """What the lattice's devices do to n samples of the part.
+
+    Attributes:
+        lattice: The places.
+        target: The samples.
+        lit: Whether the projector of a circle lights them from a place, (E, A, n).
+        measured: Whether with it the camera of a circle measures them, so many places
+            on as the lattice's offsets say, shape (E, A, F, n_offsets, n).
+    """
+
+    lattice: TableLattice
+    target: Target
+    lit: Mask
+    measured: Mask
+
+    @classmethod
+    def of(cls, scene: Scene, lattice: TableLattice, target: Target) -> "TableSets":
+        """Return what each pair of places does, in the frame of the part."""
+        n, places, offsets = len(target), lattice.n_places, lattice.offsets
+        lamps = [
+            lattice.placed(p, i) for p in lattice.projectors for i in range(places)
+        ]
+        eyes = [lattice.placed(c, k) for c in lattice.cameras for k in range(places)]
+        lit = lit_stages(scene, lamps, target) == LIT
+        views = camera_views(scene, eyes, target)
+        shape = (len(lattice.projectors), places, len(lattice.cameras), len(offsets), n)
+        measured = np.zeros(shape, dtype=bool)
+        for k, (e, i) in enumerate(product(range(shape[0]), range(places))):
+            scene.check_cancelled()
+            samples = LitSamples.of(lamps[k : k + 1], target, lit[:, k : k + 1])
+            near = (
+                places * np.arange(shape[2])[:, None] + (i + offsets) % places
+            ).ravel()
+            seen = measured_by(
+                scene, [eyes[c] for c in near], samples, [views[c] for c in near]
+            )
+            measured[e, i] = seen.T.reshape(shape[2:])
+        return cls(lattice, target, lit.T.reshape(shape[0], places, n), measured)
+
+    def everywhere(self) -> HeadSets:
+        """Return what any device lights, and any pair measures, as if of one."""
+        n = len(self.target)
+        lit = self.lit.reshape(-1, n).any(axis=0)
+        measured = self.measured.reshape(-1, n).any(axis=0)
+        return HeadSets(self.target, lit[:, None], measured[:, None])
+
+    def steps_of(
+        self, lamps: Sequence[Place], eyes: Sequence[Place] | None
+    ) -> HeadSets:
+        """Return what devices do at each angle of the table, (n, A).
+
+        At angle j they are seen j places back. Cameras None: any.
+        """
+        places, n = self.lattice.n_places, len(self.target)
+        back = -np.arange(places)
+        lit, measured = np.zeros((2, places, n), dtype=bool)
+        for e, i in lamps:
+            at = (i + back) % places
+            lit |= self.lit[e, at]
+            if eyes is None:
+                measured |= self.measured[e, at].any(axis=(1, 2))
+                continue
+            for f, k in eyes:
+                column = self._offset(k - i)
+                if column is not None:
+                    measured |= self.measured[e, at, f, column]
+        return HeadSets(self.target, lit.T, measured.T)
+
+    def near(self, lamp: Place) -> list[Place]:
+        """Return the places of cameras that measure anything with a projector."""
+        e, i = lamp
+        some = self.measured[e].any(axis=(0, 3))
+        return [
+            (int(f), int(i + self.lattice.offsets[column]) % self.lattice.n_places)
+            for f, column in np.argwhere(some)
+        ]
+
+    def _offset(self, places: int) -> int | None:
+        """The column of an offset; None where so far apart none was looked at."""
+        half = self.lattice.n_places // 2
+        centred = (places + half) % self.lattice.n_places - half
+        found = np.flatnonzero(self.lattice.offsets == centred)
+        return int(found[0]) if len(found) else None
