@@ -2,7 +2,6 @@
 
 import json
 
-import numpy as np
 import pytest
 from support.little_work import draw_fewer, work_little
 
@@ -35,7 +34,7 @@ ASKED |= {"coverage": 0.6, "min_reachable": 0.3, "check": False, "threads": 1}
 
 def prove_little(patch):
     """Let covers by pairs cost little: what is proved of them has tests of its own."""
-    draw_fewer(patch, cameras=600)
+    draw_fewer(patch, cameras=400)
     patch.setattr(camera_bound, "DEFAULT", camera_bound.ROUGH)
     for name in ("_BUDGET", "_AGAIN"):
         patch.setattr(view_selection, name, 3e7)
@@ -136,6 +135,15 @@ def scaled(*path, by):
     return told(change)
 
 
+def all_alone(document):
+    camera = document["cameras"][0]
+    camera["sole_area_m2"] = camera["seen_area_m2"]
+
+
+def bound_of_99(document):
+    document["certificates"]["cameras"]["candidates"]["lower_bound"] = 99
+
+
 def cleared(key, value):
     return told(lambda document: document.update({key: value}))
 
@@ -151,15 +159,12 @@ def cleared(key, value):
             "terms_rms_m.camera",
         ),
         (scaled("cameras", 0, "seen_area_m2", by=1.3), "C1.seen_area_m2"),
-        (scaled("coverage", "uncovered_by_cause", "few_views", by=1.4), "few_views"),
         (
-            told(lambda d: d["cameras"][0].update(sole_area_m2=d["cameras"][0]["seen_area_m2"])),
-            "C1.sole_area_m2",
+            scaled("coverage", "uncovered_by_cause", "few_views", by=1.4),
+            "uncovered_by_cause",
         ),
-        (
-            told(lambda d: d["certificates"]["cameras"]["candidates"].update(lower_bound=99)),
-            "candidates.lower_bound",
-        ),
+        (told(all_alone), "C1.sole_area_m2"),
+        (told(bound_of_99), "candidates.lower_bound"),
         (told(lambda d: d["requirements"].update(min_views=3)), "measured_m2"),
         (cleared("assumed", []), "assumed"),
         (told(lambda d: d["cost"].update(n_frames=2)), "cost.n_frames"),
@@ -168,7 +173,7 @@ def cleared(key, value):
             "triangulation.max_angle",
         ),
     ],
-)  # fmt: skip
+)
 def test_lies_are_found(plan, lie, where):
     failures = audit_plan(lie(plan), threads=1).failures
     assert any(where in failure for failure in failures), failures
@@ -239,14 +244,3 @@ def test_bodies_and_standing_devices_are_refused(ball, tmp_path):
         path.write_text(RIG + more)
         with pytest.raises(InputError, match=words):
             plan_rig(ball, load_rig(str(path)), **ASKED)
-
-
-def test_more_views_take_no_fewer_cameras(ball, rig, plan):
-    with pytest.MonkeyPatch.context() as patch:
-        work_little(patch)
-        prove_little(patch)
-        thrice = plan_rig(ball, rig, **(ASKED | {"views": 3}))
-    assert len(thrice.cameras) >= len(plan.cameras)
-    assert audit_plan(thrice, threads=1).failures == ()
-    seen = np.array([c.seen_area_m2 for c in thrice.document.cameras])
-    assert seen.min() > 0.0

@@ -53,4 +53,7 @@ def some_samples(scene: Scene, n: int) -> Target:
 def view_scanner(mesh: TriangleMesh, cameras: Sequence[CameraCalibration]) -> Scanner:
     """A scanner of cameras alone, whose rays meet at 8 to 60 degrees."""
     angles = {"min_angle": np.deg2rad(8.0), "max_angle": np.deg2rad(60.0)}
-    return dense_scanner(mesh, [], cameras, **angles)
+    scanner = dense_scanner(mesh, [], cameras, **angles)
+    # Points two pixels apart, which costs less than at every pixel.
+    check = replace(scanner.limits.check, tau_m=5e-3)
+    return replace(scanner, limits=replace(scanner.limits, check=check))

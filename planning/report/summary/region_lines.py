@@ -135,8 +135,9 @@ def floor_shortfalls(plan: RigPlan) -> Iterator[tuple[str, str, tuple[str, ...]]
         }
         yield (
             f"region {region.id} {_deed(plan, areas)}, {100 * asked:g} % asked",
-            f"{region_words(plan, region)} is {_deed(plan, areas)}, {percent(asked)} is "
-            f"required of each region (--region-coverage). Of it: {areas_line(why)}.",
+            f"{region_words(plan, region)} is {_deed(plan, areas)}, {percent(asked)} "
+            f"is required of each region (--region-coverage). Of it: "
+            f"{areas_line(why)}.",
             (*_remedies(plan, areas, kind), _accepting(accepted)),
         )
 

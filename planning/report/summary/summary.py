@@ -76,11 +76,15 @@ def _head(plan: RigPlan) -> str:
         f"         {size[0]:.0f} x {size[1]:.0f} x {size[2]:.0f} mm, "
         f"{_unit(mesh)}, up {axis_name(workspace.up)}; rig {document.rig.name}, "
         f"{'cameras alone' if plan.cameras_alone else f'{document.rig.light} light'}\n"
-        f"{''.join(f'         assumed: {words}' + chr(10) for words in document.assumed)}"
+        f"{''.join(_assumed(document.assumed))}"
         f"{shell_line(mesh)}"
         f"{bodies}"
         f"         devices may stand in {_where(workspace)}"
     )
+
+
+def _assumed(sentences: Sequence[str]) -> list[str]:
+    return [f"         assumed: {words}\n" for words in sentences]
 
 
 def lost_in_field(plan: RigPlan) -> str:

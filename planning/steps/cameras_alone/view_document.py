@@ -12,6 +12,7 @@ from planning.cameras.baselines.seams import SampledSurface, overlap_components
 from planning.cameras.photogrammetry.best_pairs import widest_sample
 from planning.cameras.photogrammetry.measured_views import measured_views
 from planning.cameras.photogrammetry.view_stage import ViewStage
+from planning.model.bodies import Obstacle
 from planning.model.document.certificates import Certificates
 from planning.model.document.coverage_records import CameraMarginal
 from planning.model.document.input_records import RigRecord, SurfaceRecord, Units
@@ -21,7 +22,6 @@ from planning.model.document.plan_document import (
     MemberRecord,
     PlanDocument,
 )
-from planning.model.obstacles import Obstacle
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera
 from planning.model.progress import Stopwatch

@@ -39,10 +39,11 @@ PLACES = ((-0.17, -0.68, 0.05), (0.17, -0.68, 0.12), (0.0, -0.66, -0.25))
 
 @pytest.fixture(scope="module")
 def scanner():
+    lenses = (BENT, BENT, (0.0,) * 5)
     cameras = [
-        camera_at(f"C{k + 1}", place, focal=1100.0, size=(280, 240), lens=lens)
-        for k, (place, lens) in enumerate(zip(PLACES, (BENT, BENT, (0.0,) * 5)))
-    ]  # fmt: skip
+        camera_at(f"C{k + 1}", PLACES[k], focal=1100.0, size=(280, 240), lens=lens)
+        for k, lens in enumerate(lenses)
+    ]
     return view_scanner(sphere(0.05, subdivisions=5), cameras)
 
 

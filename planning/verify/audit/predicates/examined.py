@@ -1,4 +1,4 @@
-"""What a plan's devices do to samples, and what any could: pairs with light or views."""
+"""What a plan's devices do to samples, and what any could: with light or alone."""
 
 from planning.model.plan import RigPlan
 from planning.verify.audit.audit_samples import AuditSamples

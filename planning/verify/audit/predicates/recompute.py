@@ -79,7 +79,7 @@ class Recomputed:
 
     @property
     def steps_of_cameras(self) -> Steps:
-        """Limits of *seen* and more that each camera passes on what is lit, (n_c, n)."""
+        """Limits of *seen* and more that cameras pass on what is lit, (n_c, n)."""
         return self.pairs.max(axis=0, initial=-1)
 
     @cached_property

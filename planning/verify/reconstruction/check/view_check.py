@@ -48,7 +48,7 @@ _Pair = tuple[int, int]
 
 @dataclass(frozen=True, eq=False)
 class Ball:
-    """Where the object is, as the workspace says: centre, shape (3,), and radius [m]."""
+    """Where the object is, as the workspace says: centre (3,) and radius [m]."""
 
     centre: Array
     radius_m: float
@@ -133,6 +133,9 @@ def merge_views(cloud: Cloud, plan: Scanner) -> Merged:
     by_pair = replace(
         cloud, projector=cloud.by_camera, ring=np.full_like(cloud.ring, -1)
     )
+    if not len(cloud):
+        none, nothing = np.zeros(0, dtype=bool), np.zeros(0)
+        return Merged(cloud, none, none, none, np.zeros((0, 3)), nothing, nothing)
     found = merge_dense(by_pair, plan, cell_m=plan.limits.dense.spacing_m)
     kept = replace(
         found.cloud,
