@@ -27,7 +27,7 @@ from planning.scene.ranges.ranged_body import RangedBody
 from planning.verify.verification import Verification, verify_plan
 
 from .steps.cameras_alone.refusals import check_alone
-from .steps.cameras_alone.stages import plan_alone
+from .steps.cameras_alone.stages import planned_alone
 from .steps.carried import check_carried, devices_of_heads, pattern_of_rig
 from .steps.checked import axes_may_help, missed_by, with_check
 from .steps.heads import planned_heads
@@ -197,7 +197,7 @@ def plan_rig(
         check_survival(request)
         if wishes.pattern == "none":
             check_alone(request)
-            planned = _alone
+            planned = planned_alone
         else:
             planned = _evaluated if evaluates else robustly(_planned)
         plan, partial = planned(request, clock, keep)
@@ -214,13 +214,6 @@ def plan_rig(
     if missed and on_miss == "raise":
         raise RequirementError(plan, missed)
     return plan
-
-
-def _alone(
-    request: PlanRequest, clock: Stopwatch, _keep: Keep | None
-) -> tuple[RigPlan, None]:
-    """Cameras alone."""
-    return plan_alone(request, clock), None
 
 
 def _evaluated(

@@ -265,10 +265,9 @@ class Requirements:
         dominant_coverage: Lit area / area reachable by projectors, on the target.
         min_reachable: Area reachable by projectors / target area.
         target: `dominant` regions, or the whole `surface`.
-        pattern: `rings`, a `dense` code of every pixel, or `none`: cameras alone.
+        pattern: `rings`, a `dense` code of every pixel, or `none`, cameras alone.
         existing: Devices that stand already and are part of every plan.
-        region_coverage: Floor of each dominant region: lit area / area reachable by
-            projectors, and measured area / area reachable by cameras; 0: no floor.
+        region_coverage: Floor of lit / reachable and of measured / reachable in each.
         region_share: Regions of at least this share of the target's area have it.
         robust: What drawn rigs must meet, where the rest is tightened for it.
         stock: Models of which there are so many and no more.

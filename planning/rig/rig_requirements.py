@@ -23,13 +23,11 @@ from planning.model.requirements import (
 from planning.scene.workspace.zone_conflicts import check_zones
 
 from .rig_tables import LimitsTable, RequirementsTable, RigTable
-from .wishes import Pattern, Wishes
+from .wishes import MOST_VIEWS, Pattern, Wishes, check_counts, views_alone
 
 _Limits = TypeVar("_Limits", ProjectorLimits, CameraLimits, TriangulationLimits)
 
 _WARN_INCIDENCE_DEG = 70.0
-# Pairs that may be asked for of each point: more are no survival but another rig.
-MOST_VIEWS = 8
 # Triangulation angles where a rig states none: errors grow as 1 / sin beyond [rad].
 # Of cameras alone images differ too much to be matched, docs/method/photogrammetry.md.
 _ANGLES = (math.radians(10.0), math.radians(90.0))
@@ -59,7 +57,7 @@ def build_requirements(
     target = wishes.target or "dominant"
     _check_choice("target", target, ("dominant", "surface"))
     _check_choice("pattern", wishes.pattern, ("rings", "dense", "none"))
-    _check_counts(wishes)
+    check_counts(wishes)
     alone = wishes.pattern == "none"
     _check_positive("tau_m", tau_m)
     _check_choice("accuracy_of", wishes.accuracy_of, ("noise", "total"))
@@ -136,41 +134,6 @@ def limit_notes(limits: LimitsTable) -> tuple[str, ...]:
             f"and at 84 only 0.6 of the surface is measured"
         )
     return tuple(sentences)
-
-
-def _check_counts(wishes: Wishes) -> None:
-    """Refuse fewer devices than any plan has.
-
-    Raises:
-        InputError: It says how many there must be.
-    """
-    least = {"max_projectors": 1, "max_cameras": 1}
-    if wishes.pattern == "none":
-        least = {"max_projectors": 0, "max_cameras": 2}
-        if wishes.max_projectors:
-            raise InputError(
-                f"max_projectors = {wishes.max_projectors} with pattern 'none', which "
-                f"has no projector: leave it out, or make it 0"
-            )
-    for name, few in least.items():
-        most = getattr(wishes, name)
-        if most is not None and not most >= few:
-            raise InputError(f"{name} = {most} must be {few} or more")
-
-
-def views_alone(wishes: Wishes) -> int:
-    """Return how many cameras must see what counts where there is no projector.
-
-    Raises:
-        InputError: If it is fewer than two, or more than may be asked for.
-    """
-    views = 2 if wishes.views is None else wishes.views
-    if not 2 <= views <= MOST_VIEWS:
-        raise InputError(
-            f"views = {views} must be from 2 to {MOST_VIEWS} with pattern 'none': one "
-            f"camera alone measures nothing"
-        )
-    return views
 
 
 def _survival(wishes: Wishes) -> Survival | None:

@@ -187,6 +187,7 @@ def test_a_bound_that_fewer_of_the_plans_cameras_refute_is_found(plan):
     proof = document.certificates.cameras
     proof = proof.changed(
         count=n,
+        required_m2=0.8 * proof.required_m2,
         status="optimal",
         candidates=proof.candidates.changed(lower_bound=n),
         needed=proof.needed.changed(count=n, lower_bound=n),

@@ -155,17 +155,13 @@ def _measured(plan: RigPlan) -> Iterator[_Block]:
     sigma, limit = plan.coverage.sigma, asked.triangulation.max_sigma_m
     lit = _share(areas.lit_m2, areas.reachable_by_projectors_m2)
     seen = _share(areas.measured_m2, areas.reachable_by_cameras_m2)
-    text = f"{_share(areas.measured_m2, areas.area_m2)} of the target; of what can be, "
+    first = f"lit {lit} ({100 * asked.dominant_coverage:g} asked) and measured"
     if plan.cameras_alone:
-        text += (
-            f"by a pair of the {asked.min_views} or more cameras that see it {seen} "
-            f"({100 * asked.coverage:g} asked)"
-        )
-    else:
-        text += (
-            f"lit {lit} ({100 * asked.dominant_coverage:g} asked) and measured {seen} "
-            f"({100 * asked.coverage:g})"
-        )
+        first = f"by pairs, {asked.min_views} cameras or more seeing it, measured"
+    text = (
+        f"{_share(areas.measured_m2, areas.area_m2)} of the target; of what can be, "
+        f"{first} {seen} ({100 * asked.coverage:g})"
+    )
     yield "MEASURED", text, 2
     if sigma is None:
         return

@@ -20,6 +20,13 @@ from planning.steps.prepare import prepared
 from .view_document import ViewPlan, write_view_plan
 
 
+def planned_alone(
+    request: PlanRequest, clock: Stopwatch, _keep: object
+) -> tuple[RigPlan, None]:
+    """Return what `plan_alone` does, and no partial plan: rings may not help it."""
+    return plan_alone(request, clock), None
+
+
 def plan_alone(request: PlanRequest, clock: Stopwatch) -> RigPlan:
     """Return the fewest cameras found whose pairs measure what is required.
 

@@ -6,7 +6,8 @@ The texture is fixed in the object, so that all views agree: an albedo
 
 of n waves whose directions are uniform on the sphere and whose lengths are uniform in
 their logarithm between 6 and 96 pixels of the cameras at the object: the finest that
-foreshortening doesn't soon take from an image, and coarse ones by which a search begins.
+foreshortening doesn't soon take from an image, and coarse ones by which a search
+begins.
 """
 
 from dataclasses import dataclass, replace

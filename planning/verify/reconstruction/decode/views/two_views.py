@@ -105,7 +105,7 @@ class TwoViews:
 
 
 def plane_normals(camera: CameraCalibration, pixels: Array, planes: Array) -> Array:
-    """Return unit normals in the world of planes seen at pixels, off the camera, (n, 3).
+    """Return unit normals in the world of planes at pixels, off the camera, (n, 3).
 
     With a plane N.X = c the inverse depth is N.(x, 1) / c.
     """

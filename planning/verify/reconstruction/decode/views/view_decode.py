@@ -16,7 +16,7 @@ from .two_views import homogeneous, plane_normals
 from .window_fit import REACH_PX, Fitted, WindowFit
 from .window_search import WindowSearch
 
-# Grey levels up to which a pixel shows nothing but noise and the dark beside the object.
+# Grey levels up to which a pixel shows but noise, and the dark beside the object.
 DARK = 20.0
 # Images are halved so often.
 _LEVELS = 4
@@ -176,7 +176,7 @@ def _judged(
     whole = np.isfinite(depth) & ~at_step & ~lone
     whole = _hanging_together(whole, _FEWEST_PX // grid.step**2)
     fails["isolated"] = ~whole.ravel()[place]
-    # What lies beside a surface may look like its border for once, but never as exactly.
+    # What lies beside a surface may look like its border, but never as exactly.
     inner = binary_erosion(whole, iterations=-(-REACH_PX // grid.step))
     at_border = whole & ~np.asarray(inner, dtype=bool)
     typical = np.median(cloud.noise_px[alone]) if alone.any() else 0.0
