@@ -272,7 +272,7 @@ class Requirements:
         robust: What drawn rigs must meet, where the rest is tightened for it.
         stock: Models of which there are so many and no more.
         survival: Pairs that must measure what counts, and losses to survive.
-        min_views: Cameras that must see what counts, of pattern `none`; else None.
+        min_views: Cameras that must see what counts, of `none`; else None.
     """
 
     max_projectors: int
