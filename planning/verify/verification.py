@@ -220,24 +220,34 @@ def _reconstruct(
         standing = replace(standing, mesh=mesh)
     case, believed = audit.case, Scanner.of(plan)
     samples = bare(case.samples)
-    measured = {
-        "seed": seed,
-        "threads": threads,
-        "truth": standing,
-        "expected": Expected(samples, case.actual.measured, case.actual.by_pair),
-        "progress": countdown(
-            lambda line: say(f"pixels: {line}"),
-            n_cameras=len(believed.cameras),
-            threads=threads,
-        ),
-        "photometry": how["photometry"],
-    }
+    expected = Expected(samples, case.actual.measured, case.actual.by_pair)
+    told = countdown(
+        lambda line: say(f"pixels: {line}"),
+        n_cameras=len(believed.cameras),
+        threads=threads,
+    )
     if plan.cameras_alone:
         space = plan.requirements.workspace
-        ball = Ball(np.array(space.centre), space.object_radius_m)
-        pixels = reconstruct_views(believed, ball, **measured)
+        pixels = reconstruct_views(
+            believed,
+            Ball(np.array(space.centre), space.object_radius_m),
+            seed=seed,
+            threads=threads,
+            truth=standing,
+            expected=expected,
+            photometry=how["photometry"],
+            progress=told,
+        )
     else:
-        pixels = reconstruct(believed, physics=how["physics"], **measured)
+        pixels = reconstruct(
+            believed,
+            seed=seed,
+            threads=threads,
+            truth=standing,
+            expected=expected,
+            progress=told,
+            **how,
+        )
     possible = possible_at_floors(plan, case.samples, threads=threads)
     prediction = PredictedSamples(
         samples, case.samples.weights, case.actual.measured_by, possible

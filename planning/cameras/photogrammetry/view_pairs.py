@@ -117,7 +117,7 @@ class Sightings:
         normals = rows_of(self.normals, self.sample[first])
         x = _solved(precisions[0] + precisions[1], normals)
         # Rays along one line meet anywhere, and the product of infinities says nothing.
-        met = np.isfinite(x).all(axis=1)
+        met: NDArray[np.bool_] = np.asarray(np.all(np.isfinite(x), axis=1))
         along = np.einsum("ij,ij->i", normals, np.where(met[:, None], x, 0.0))
         noise = np.where(met, along, np.inf)
         terms: dict[ViewTerm, Array] = {"matches": limits.noise_px * np.sqrt(noise)}

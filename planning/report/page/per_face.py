@@ -158,10 +158,10 @@ def views_per_face(
         for c in range(p + 1, n_c):
             both = np.flatnonzero(views.met[p, c] >= 0)
             some, passed = samples.take(both), views.met[p, c, both]
-            pair = [Sighted.of(cameras[k], some) for k in (p, c)]
-            errors = view_terms(*pair, some.normals, limits)
+            one, other = (Sighted.of(cameras[k], some) for k in (p, c))
+            errors = view_terms(one, other, some.normals, limits)
             names = ("matches",) if limits.accuracy_of == "noise" else tuple(errors)
-            met, total = met_angle(*pair), deviation(errors)
+            met, total = met_angle(one, other), deviation(errors)
             limited = np.where(passed == 0, met, deviation(errors, names))
             failing[p, c, both] = np.where(passed == GOOD, np.nan, limited)
             good = (passed == GOOD) & views.measured[both]

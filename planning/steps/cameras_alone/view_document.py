@@ -96,11 +96,13 @@ def write_view_plan(partial: ViewPlan, clock: Stopwatch) -> RigPlan:
         coverage=claims.coverage,
         marginal=marginal,
         certificates=certificates,
-        baselines=baseline_rows(
-            devices.cameras,
-            SampledSurface(samples.points, samples.normals),
-            claims.measured_by,
-            scene.requirements.camera.max_incidence,
+        baselines=tuple(
+            baseline_rows(
+                devices.cameras,
+                SampledSurface(samples.points, samples.normals),
+                claims.measured_by,
+                scene.requirements.camera.max_incidence,
+            )
         ),
         camera_groups=tuple(
             tuple(devices.cameras[c].id for c in group)

@@ -14,6 +14,7 @@ share of what they are off the principal point, and that point by itself.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geometry.arrays import Array, Ints, cross
 from planning.model.calibration_errors import CalibrationErrors
@@ -93,7 +94,7 @@ def view_terms(
 
 def pair_passes(
     one: Sighted, other: Sighted, normals: Array, limits: TriangulationLimits
-) -> Array:
+) -> NDArray[np.int8]:
     """Return how many limits of pairs hold before the first that doesn't, int8 (n,)."""
     met = met_angle(one, other)
     low, high = limits.min_angle or 0.0, limits.max_angle or np.pi
@@ -103,7 +104,7 @@ def pair_passes(
     named = ["matches"] if limits.accuracy_of == "noise" else list(terms)
     sigma = np.sqrt(sum(terms[name] ** 2 for name in named))
     most = np.inf if limits.max_sigma_m is None else limits.max_sigma_m
-    return passes + (between & (sigma <= most))
+    return passes + (between & (sigma <= most)).astype(np.int8)
 
 
 def _solved(matrices: Array, vectors: Array) -> Array:

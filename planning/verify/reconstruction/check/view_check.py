@@ -8,7 +8,7 @@ import numpy as np
 from geometry.mesh.sampling import sample_surface
 from geometry.parallel import abandonable, n_threads
 from geometry.rays.rays import RayCaster
-from planning.verify.reconstruction.arrays import Array
+from planning.verify.reconstruction.arrays import Array, Mask
 from planning.verify.reconstruction.calibration import CameraCalibration
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.decode.views.view_decode import (
@@ -178,12 +178,12 @@ def _images(
         return list(pool.map(record, range(len(plan.cameras))))
 
 
-def _in_image(camera: CameraCalibration, places: Array) -> Array:
+def _in_image(camera: CameraCalibration, places: Array) -> Mask:
     pixels = camera.project(places)
     width, height = camera.resolution
     with np.errstate(invalid="ignore"):
         inside = (pixels >= 0.0) & (pixels <= np.array([width - 1, height - 1]))
-    return inside.all(axis=1)
+    return np.asarray(inside.all(axis=1), dtype=bool)
 
 
 def _of_cameras(cloud: Cloud, a: int, b: int) -> Cloud:

@@ -47,12 +47,12 @@ def between_pixels(image: Grey, row: Array, column: Array) -> Grey:
     """Return what lies between four pixels of an image, bilinearly; 0 outside."""
     h, w = image.shape
     inside = (row >= 0.0) & (row < h - 1.0) & (column >= 0.0) & (column < w - 1.0)
-    row = np.where(inside, row, 0.0).astype(np.float32)
-    column = np.where(inside, column, 0.0).astype(np.float32)
+    y = np.where(inside, row, 0.0).astype(np.float32)
+    x = np.where(inside, column, 0.0).astype(np.float32)
     # Rounded to single precision a place may have come to lie on the last row.
-    top = np.minimum(row.astype(np.int32), np.int32(h - 2))
-    left = np.minimum(column.astype(np.int32), np.int32(w - 2))
-    down, right = row - top, column - left
+    top = np.minimum(y.astype(np.int32), np.int32(h - 2))
+    left = np.minimum(x.astype(np.int32), np.int32(w - 2))
+    down, right = y - top, x - left
     first = top * np.int32(w) + left
     flat = image.ravel()
     above = flat.take(first)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planning.verify.reconstruction.arrays import Array
+from planning.verify.reconstruction.arrays import Array, Indices
 from planning.verify.reconstruction.calibration import CameraCalibration
 from planning.verify.reconstruction.patterns.lens import bent
 
@@ -58,10 +58,10 @@ class TwoViews:
             second, middle, by_u, by_v, offset @ second.world_from_device[:3, :3]
         )
 
-    def take(self, chosen: Array) -> "TwoViews":
+    def take(self, chosen: Indices) -> "TwoViews":
         """Return some of the pixels."""
-        columns = (self.middle, self.by_u, self.by_v)
-        return TwoViews(self.second, *(part[chosen] for part in columns), self.t)
+        middle, by_u, by_v = (p[chosen] for p in (self.middle, self.by_u, self.by_v))
+        return TwoViews(self.second, middle, by_u, by_v, self.t)
 
     def seen_at(
         self, planes: Array, offsets: Array, *, with_slope: bool = False

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import binary_erosion, label
 
-from planning.verify.reconstruction.arrays import Array, Grey, Mask
+from planning.verify.reconstruction.arrays import Array, Grey, Indices, Mask
 from planning.verify.reconstruction.calibration import CameraCalibration
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.decode.dense.dense_decode import depth_steps
@@ -142,7 +142,7 @@ def _judged(
     cloud: Cloud,
     fitted: Fitted,
     grid: Grid,
-    about: Array,
+    about: Indices,
     cameras: tuple[CameraCalibration, CameraCalibration],
     limits: DenseLimits,
 ) -> MatchedViews:
@@ -231,7 +231,7 @@ def _facing(cloud: Cloud, fitted: Fitted, first: CameraCalibration) -> Mask:
     return (looks[0] >= least) & (looks[1] >= least)
 
 
-def _neighbours(planes: Array, sigma: Array, step: int, focal_px: float) -> Array:
+def _neighbours(planes: Array, sigma: Array, step: int, focal_px: float) -> Indices:
     """Return how many of four neighbours lie on each place's plane, shape (h, w).
 
     But for noise, and half of what is between both, for surfaces are curved.

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import map_coordinates, spline_filter
 
-from planning.verify.reconstruction.arrays import Array, Grey
+from planning.verify.reconstruction.arrays import Array, Grey, Mask
 from planning.verify.reconstruction.calibration import CameraCalibration
 
 from .level_image import LevelImage, between_pixels
@@ -48,7 +48,7 @@ class Fitted:
     sigma: Array
     scores: Array
     moved: Array
-    lit: Array
+    lit: Mask
 
 
 class WindowFit:
@@ -67,7 +67,10 @@ class WindowFit:
         grey = images[1].grey.astype(np.float64)
         self._spline = spline_filter(grey).astype(np.float32)
         by_row, by_column = np.gradient(grey)
-        self._slopes = by_column.astype(np.float32), by_row.astype(np.float32)
+        self._slopes: tuple[Grey, Grey] = (
+            np.asarray(by_column, dtype=np.float32),
+            np.asarray(by_row, dtype=np.float32),
+        )
 
     def fitted(self, pixels: Array, planes: Array) -> Fitted:
         """Return the best fit near planes (n, 3) of windows about pixels (n, 2)."""
@@ -83,7 +86,8 @@ class WindowFit:
         rows, columns = self._images[0].places(
             *(pixels[:, None, k] + self._offsets[:, k] for k in (0, 1))
         )
-        first = map_coordinates(self._images[0].grey, [rows, columns], order=0)
+        taken = map_coordinates(self._images[0].grey, [rows, columns], order=0)
+        first: Grey = np.asarray(taken, dtype=np.float32)
         planes = planes.copy()
         for number in range(_STEPS):
             second, slope, _ = self._second(views, planes, smooth=number >= _ROUGH)
@@ -101,13 +105,14 @@ class WindowFit:
         """Grey levels of the second windows, what they change by with d, and du/dd."""
         u, v, du, dv = views.seen_at(planes, self._offsets, with_slope=True)
         at = self._images[1].places(u, v)
+        grey = between_pixels(self._images[1].grey, *at)
         if smooth:
-            grey = map_coordinates(self._spline, at, order=3, prefilter=False, cval=0.0)
-        else:
-            grey = between_pixels(self._images[1].grey, *at)
+            fine = map_coordinates(self._spline, at, order=3, prefilter=False, cval=0.0)
+            grey = np.asarray(fine, dtype=np.float32)
         along, down = (between_pixels(s, *at) for s in self._slopes)
         middle = len(self._offsets) // 2
-        return grey, along * du + down * dv, np.hypot(du[:, middle], dv[:, middle])
+        slope: Grey = np.asarray(along * du + down * dv, dtype=np.float32)
+        return grey, slope, np.hypot(du[:, middle], dv[:, middle])
 
     def _judged(
         self,

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planning.verify.reconstruction.arrays import Array, Indices
+from planning.verify.reconstruction.arrays import Array, Grey, Indices
 from planning.verify.reconstruction.calibration import CameraCalibration
 
 from .level_image import Grid, LevelImage
@@ -127,7 +127,7 @@ class _LevelWork:
         grid: Grid,
     ) -> None:
         first, self._second = images[0][level], images[1][level]
-        reach = np.arange(-_REACH, _REACH + 1) * float(first.fold)
+        reach = np.arange(-_REACH, _REACH + 1, dtype=np.float64) * first.fold
         self._offsets = np.stack(np.meshgrid(reach, reach), axis=-1).reshape(-1, 2)
         u, v = (grid.pixels[:, None, k] + self._offsets[:, k] for k in (0, 1))
         self._windows = _normalised(first.at(u, v))
@@ -153,7 +153,7 @@ class _LevelWork:
         return Planes(known.grid, after, best)
 
 
-def _normalised(windows: Array) -> Array:
+def _normalised(windows: Grey) -> Grey:
     """Return windows (n, m) less their mean and of length 1; 0 where they are flat."""
     centred = windows - windows.mean(axis=1, keepdims=True)
     length = np.sqrt(np.einsum("nm,nm->n", centred, centred))
