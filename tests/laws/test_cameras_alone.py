@@ -189,7 +189,7 @@ def test_a_bound_that_fewer_of_the_plans_cameras_refute_is_found(plan):
         count=n,
         required_m2=0.8 * proof.required_m2,
         status="optimal",
-        candidates=proof.candidates.changed(lower_bound=n),
+        candidates=proof.candidates.changed(lower_bound=n, for_total=n),
         needed=proof.needed.changed(count=n, lower_bound=n),
     )
     certificates = document.certificates.changed(cameras=proof)
