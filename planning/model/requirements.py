@@ -272,7 +272,7 @@ class Requirements:
         robust: What drawn rigs must meet, where the rest is tightened for it.
         stock: Models of which there are so many and no more.
         survival: Pairs that must measure what counts, and losses to survive.
-        min_views: Cameras that must see what counts, of `none`; else None.
+        min_views: Cameras that must see what counts, of `none`.
     """
 
     max_projectors: int
@@ -304,8 +304,7 @@ class Requirements:
         return tuple(device for device in self.existing if device.kind == kind)
 
     def to_document(self) -> dict[str, Any]:
-        """Return plain JSON values."""
-        # By way of JSON, which turns tuples to lists and keeps every float.
+        """Return plain JSON values: tuples become lists, every float is kept."""
         document = json.loads(json.dumps(asdict(self)))
         devices = [(device, _OF_ITS_OWN) for device in document["existing"]]
         tables = [
