@@ -8,10 +8,10 @@ from geometry.regions.regions import DominantRegions
 from planning.cameras.proved_cameras import CameraStage
 from planning.model.document.certificates import CamerasBy
 from planning.model.document.ring_records import AxisTaken, RingAxis
+from planning.model.document.station_records import Stationed
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.projectors.projector_stage import ProjectorStage
 from planning.proofs.surviving_counts import SurvivingCount
-from planning.report.entries.station_entries import Stationed
 from planning.rig.mounted import Mounted
 from planning.rig.range_guard import Guard
 from planning.rig.rig import Rig

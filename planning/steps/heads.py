@@ -5,11 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from planning.heads.fewest_heads import FoundHeads, fewest_heads
-from planning.heads.head_poses import HeadSource, PlacedHead, widened
-from planning.heads.head_stage import least_by_light, stages_of
-from planning.heads.tour import shortest_way
-from planning.model.document.station_records import StationCount, StationsRecord
+from planning.cameras.stations.heads.fewest_heads import FoundHeads, fewest_heads
+from planning.cameras.stations.heads.head_poses import HeadSource, PlacedHead, widened
+from planning.cameras.stations.heads.head_stage import least_by_light, stages_of
+from planning.cameras.stations.heads.tour import shortest_way
+from planning.model.document.station_records import (
+    Placement,
+    StationCount,
+    Stationed,
+    StationsRecord,
+)
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.heads import Head
 from planning.model.plan import RigPlan
@@ -17,7 +22,6 @@ from planning.model.progress import Stopwatch
 from planning.model.words import count_words
 from planning.proofs import projector_bound
 from planning.report.assemble import write_plan
-from planning.report.entries.station_entries import Placement, Stationed
 from planning.report.partial_plan import PartialPlan, PlanRequest, Prepared
 
 from .prepare import prepared

@@ -5,11 +5,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from geometry.arrays import Array
-from planning.heads.head_poses import PlacedHead
-from planning.heads.head_stage import stages_of
+from planning.cameras.stations.heads.head_poses import PlacedHead
+from planning.cameras.stations.heads.head_stage import stages_of
+from planning.cameras.stations.turntable.fewest_steps import (
+    Steps,
+    StepSearch,
+    pairs_of_counts,
+)
+from planning.cameras.stations.turntable.table_lattice import TableLattice, about_axis
+from planning.cameras.stations.turntable.table_sets import TableSets
 from planning.model.device_poses import moved_to
 from planning.model.document.station_records import (
+    Placement,
     StationCount,
+    Stationed,
     StationsRecord,
     TradeRow,
 )
@@ -18,13 +27,9 @@ from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
 from planning.model.words import count_words
 from planning.report.assemble import write_plan
-from planning.report.entries.station_entries import Placement, Stationed
 from planning.report.partial_plan import PartialPlan, PlanRequest, Prepared
 from planning.scene.draws import DRAWS
 from planning.scene.scene import Scene
-from planning.turntable.fewest_steps import Steps, StepSearch, pairs_of_counts
-from planning.turntable.table_lattice import TableLattice, about_axis
-from planning.turntable.table_sets import TableSets
 
 from .prepare import prepared
 from .stages import short_of

@@ -112,8 +112,8 @@ class TurntableRecord(Part):
         )
 
 
-class StationsRecord(Part):
-    """How often a head is set down, and by what."""
+class CarrierRecord(Part):
+    """What carries a head, and how often it may be set down."""
 
     max: int | None = None
     carrier: Literal["robot", "tripod"]

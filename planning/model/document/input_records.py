@@ -9,7 +9,7 @@ from pydantic import Field
 from geometry.devices import ParallelModel, PinholeModel
 from planning.model.bodies import Body
 
-from .head_records import HeadRecord, StationsRecord, TurntableRecord
+from .head_records import CarrierRecord, HeadRecord, TurntableRecord
 from .part import Interval, Matrix3, Part, Resolution, Vector3
 
 Limit = Literal[
@@ -194,7 +194,7 @@ class RigRecord(Part):
     more_cameras: tuple[ModelRecord, ...] = ()
     head: HeadRecord | None = None
     turntable: TurntableRecord | None = None
-    stations: StationsRecord | None = None
+    stations: CarrierRecord | None = None
 
     def models(self, kind: str) -> tuple[ModelRecord, ...]:
         """Return the models of a `projector` or a `camera`, the first one first."""

@@ -1,6 +1,9 @@
 """`stations` of a plan: poses of a sensor head, or steps of a turntable."""
 
+from dataclasses import dataclass
 from typing import Literal
+
+from geometry.arrays import Array
 
 from .part import Part, Pose
 
@@ -91,3 +94,27 @@ class StationsRecord(Part):
     axis: tuple[float, float, float] | None = None
     way_m: float | None = None
     steps: tuple[TradeRow, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """A station: where it is, and how many of the devices in order are there."""
+
+    id: str
+    world_from_station: Array
+    n_projectors: int
+    n_cameras: int
+    angle: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Stationed:
+    """Stations of a plan in the making.
+
+    Attributes:
+        placements: In the order of the devices.
+        record: All but the stations.
+    """
+
+    placements: tuple[Placement, ...]
+    record: StationsRecord

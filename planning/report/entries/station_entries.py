@@ -1,45 +1,14 @@
 """What a plan says of the stations of its devices."""
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 
-from geometry.arrays import Array
 from planning.model.device_poses import DECIMALS, rounded_pose
 from planning.model.document.station_records import (
-    StationCount,
+    Stationed,
     StationRecord,
     StationsRecord,
 )
 from planning.report.judged import Devices
-
-
-@dataclass(frozen=True, eq=False)
-class Placement:
-    """A station: where it is, and how many of the devices in order are there."""
-
-    id: str
-    world_from_station: Array
-    n_projectors: int
-    n_cameras: int
-    angle: float | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Stationed:
-    """Stations of a plan in the making.
-
-    Attributes:
-        placements: In the order of the devices.
-        record: All but the stations.
-    """
-
-    placements: tuple[Placement, ...]
-    record: StationsRecord
-
-    def counted(self, count: StationCount) -> "Stationed":
-        """Return the same with another count."""
-        return replace(self, record=self.record.changed(count=count))
 
 
 def stations_record(stationed: Stationed, devices: Devices) -> StationsRecord:

@@ -13,6 +13,7 @@ from geometry.poses import horizontal_axes
 from planning.model.document.certificates import Certificate
 from planning.model.plan import RigPlan
 from planning.model.words import count_words, percent
+from planning.report.tolerance.robust_lines import robust_cost
 from planning.report.tolerance.survival_lines import counted_words, losses_words
 
 from .cause_words import causes_line
@@ -20,7 +21,6 @@ from .check_lines import error_words, unchecked
 from .device_lines import axis_name, devices_words, models_line, standing, used_up
 from .proof_lines import user_selection
 from .region_lines import worst_region
-from .robust_lines import robust_cost
 from .shortfall import Shortfall, missing
 from .station_lines import fewest_words, title_words
 from .summary import lost_in_field

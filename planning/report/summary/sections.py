@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from planning.model.plan import RigPlan
+from planning.report.tolerance.robust_lines import robust_lines
 from planning.report.tolerance.survival_lines import survival_lines
 
 from .check_lines import check_lines, cost_lines
@@ -13,7 +14,6 @@ from .light_lines import light_lines
 from .proof_lines import proof_lines
 from .region_lines import region_table
 from .ring_lines import code_lines, range_lines, ring_lines
-from .robust_lines import robust_lines
 from .station_lines import station_lines
 from .zone_lines import zone_lines
 

@@ -10,6 +10,7 @@ from planning.model.document.input_records import MeshRecord
 from planning.model.plan import RigPlan
 from planning.model.requirements import Workspace
 from planning.model.words import labelled, percent
+from planning.report.tolerance.robust_lines import robust_lines
 from planning.report.tolerance.survival_lines import survival_lines
 
 from .check_lines import check_lines, cost_lines, unchecked
@@ -18,7 +19,6 @@ from .device_lines import axis_name, device_lines, devices_words, mount_lines
 from .light_lines import light_lines
 from .proof_lines import proof_lines
 from .ring_lines import code_lines, range_lines, ring_lines
-from .robust_lines import robust_lines
 from .station_lines import station_lines
 from .warning_lines import warning_lines
 

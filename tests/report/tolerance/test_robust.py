@@ -12,11 +12,11 @@ from planning.model.errors import InfeasibleLimitsError
 from planning.model.progress import Stopwatch
 from planning.report.partial_plan import PlanRequest
 from planning.report.summary.brief import brief
-from planning.report.summary.robust_lines import robust_lines
 from planning.report.summary.shortfall import shortfalls
 from planning.report.tolerance import robust as robust_module
 from planning.report.tolerance.asked import Asked, Figures, as_asked
 from planning.report.tolerance.robust import least_met, robustly
+from planning.report.tolerance.robust_lines import robust_lines
 from planning.rig.rig import load_rig
 from planning.rig.wishes import Wishes
 

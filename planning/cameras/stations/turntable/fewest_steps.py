@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.arrays import Ints
-from planning.heads.head_cover import HeadCover
+from planning.cameras.stations.heads.head_cover import HeadCover
 from planning.scene.placed_bodies import Device
 from planning.scene.scene import Scene
 from solvers import solve_cover

@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 
 from geometry.arrays import Mask
-from planning.heads.head_cover import HeadSets
+from planning.cameras.stations.heads.head_cover import HeadSets
 from planning.scene.camera_views import camera_views
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT

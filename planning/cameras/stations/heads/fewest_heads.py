@@ -17,7 +17,10 @@ _ROUNDS = 4
 _JOINING = 3
 # Of a lattice's spacing: how far around a head it is moved, round by round.
 _SCALES = (1.0, 0.5, 0.25)
-_BUDGET = 2e9
+# Counted work of the cover whose bound is told, and of each other cover.
+_PROOF_BUDGET, _BUDGET = 1e9, 5e7
+# Of what is asked, at most that a head less is lacking before it is moved together.
+_NEARLY = 0.06
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +78,9 @@ def fewest_heads(
     scene, heads = source.scene, source.over(n)
     sets = HeadSets.of(scene, heads, scene.target_samples(DRAWS.cameras))
     for draw in range(_ROUNDS):
-        heads, sets, found = _with_fewer(source, heads, sets, n, most, least)
+        if not draw:
+            heads, sets = _with_better(source, heads, sets, n, least)
+        found = _fewest_of(source, heads, sets, most)
         fresh = scene.target_samples(DRAWS.fresh_cameras.later(1 + draw))
         again = HeadSets.of(scene, heads, fresh)
         met = found.needed <= most
@@ -87,22 +92,23 @@ def fewest_heads(
     return found
 
 
-def _with_fewer(
+def _with_better(
     source: HeadSource,
     heads: tuple[PlacedHead, ...],
     sets: HeadSets,
     n: int,
-    most: int,
     least: int,
-) -> tuple[tuple[PlacedHead, ...], HeadSets, FoundHeads]:
-    """Return the fewest of heads, and of others around as long as they save one."""
+) -> tuple[tuple[PlacedHead, ...], HeadSets]:
+    """Return heads, and others around them as long as those save one."""
     while True:
-        found = _fewest_of(source, heads, sets, most)
-        if found.needed <= max(least, 1):
-            return heads, sets, found
-        moved = _moved_together(source, found, n, found.needed - 1)
+        cover = HeadCover.of(source.scene, sets)
+        solution = solve_cover(cover.problem, seed=source.scene.seed, budget=_BUDGET)
+        needed = len(solution.selected)
+        if needed <= max(least, 1):
+            return heads, sets
+        moved = _moved_together(source, heads, cover, n, needed - 1)
         if moved is None:
-            return heads, sets, found
+            return heads, sets
         heads = heads + moved
         sets = sets.beside(HeadSets.of(source.scene, moved, sets.target))
 
@@ -115,7 +121,8 @@ def _fewest_of(
     Of two that do, the one that measures less isn't offered again; the bound is of any.
     """
     cover, seed = HeadCover.of(source.scene, sets), source.scene.seed
-    first = solution = solve_cover(cover.problem, seed=seed, budget=_BUDGET)
+    first = solve_cover(cover.problem, seed=seed, budget=_PROOF_BUDGET)
+    solution = first
     while True:
         chosen, needed = solution.selected, len(solution.selected)
         if needed > most:
@@ -133,18 +140,24 @@ def _fewest_of(
 
 
 def _moved_together(
-    source: HeadSource, found: FoundHeads, n: int, count: int
+    source: HeadSource,
+    every: tuple[PlacedHead, ...],
+    cover: HeadCover,
+    n: int,
+    count: int,
 ) -> tuple[PlacedHead, ...] | None:
     """Return so many heads that are enough, moved from those that nearly are.
 
     One after the other takes the pose around it with which least is lacking.
     """
-    scene, cover = source.scene, found.cover
+    scene = source.scene
     few = solve_max_coverage(cover.problem, count, seed=scene.seed, budget=_BUDGET)
-    heads = [found.heads[k] for k in few.selected]
+    heads = [every[k] for k in few.selected]
     sets = cover.sets.take(few.selected)
     everywhere = replace(cover, sets=sets)
     lacking = everywhere.lacking(np.arange(len(heads)))
+    if lacking > _NEARLY * cover.quotas.total:
+        return None
     for scale in _SCALES:
         for k in range(len(heads)):
             scene.check_cancelled()

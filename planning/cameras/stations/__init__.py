@@ -1,0 +1,1 @@
+"""Devices that stand together: heads, and what stands before a turntable."""

@@ -1,0 +1,177 @@
+"""Plans of heads: rigid, measured by their own pairs, audited, and refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.group_rigs import head_rig, planned
+
+from geometry.shapes.boxes import box_gap
+from planning.model.errors import InputError
+from planning.model.planned import meet
+from planning.rig.rig import Rig
+from planning.scene.draws import DRAWS
+from planning.scene.placed_bodies import placed_box
+from planning.verify.audit.audit import audit_plan
+
+_BODY = {"size_mm": [420.0, 100.0, 80.0], "centre_mm": [0.0, 0.0, -30.0]}
+
+
+@pytest.fixture(scope="module")
+def few(with_little_work):
+    """Few candidates, and little work on the rest."""
+    with pytest.MonkeyPatch.context() as patch, with_little_work():
+        patch.setattr(Rig, "n_projector_poses", 40)
+        patch.setitem(vars(DRAWS), "cameras", replace(DRAWS.cameras, count=600))
+        yield
+
+
+@pytest.fixture(scope="module")
+def plan(few):
+    return planned(head_rig(head={"body": _BODY}), max_heads=9)
+
+
+def _at(plan, one):
+    every = {d.id: d for d in (*plan.projectors, *plan.cameras)}
+    return [every[name] for name in (*one.projectors, *one.cameras)]
+
+
+def test_every_head_holds_its_devices_as_the_rig_says(plan):
+    head, told = plan.document.rig.head.head(), plan.document.stations
+    assert told.kind == "heads"
+    assert [one.id for one in told.stations] == [
+        f"H{k + 1}" for k in range(len(told.stations))
+    ]
+    for one in told.stations:
+        world = np.array(one.world_from_station)
+        for device, planned_at in zip(head.devices, _at(plan, one), strict=True):
+            truth = world @ device.head_from_device
+            assert planned_at.world_from_device == pytest.approx(truth, abs=2e-5)
+            assert planned_at.station == one.id
+
+
+def test_count_and_bounds_are_told_and_what_is_asked_is_measured(plan):
+    count, target = plan.document.stations.count, plan.coverage.target
+    assert count.count == len(plan.document.stations.stations) == count.needed
+    assert 1 <= count.lower_bound <= count.count
+    assert 1 <= count.everywhere <= count.count
+    assert target.measured_m2 >= 0.95 * target.reachable_by_cameras_m2
+    assert target.lit_m2 >= 0.9 * target.reachable_by_projectors_m2
+
+
+def test_housings_keep_apart(plan):
+    body = plan.document.rig.head.body
+    boxes = [
+        placed_box(body, np.array(one.world_from_station))
+        for one in plan.document.stations.stations
+    ]
+    gaps = [box_gap(a, b) for k, a in enumerate(boxes) for b in boxes[:k]]
+    assert min(gaps) > 0.0
+
+
+def test_the_audit_finds_every_claim_true(plan):
+    audit = audit_plan(plan, n_samples=6000)
+    assert audit.failures == ()
+    assert audit.unmet == ()
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (lambda s: s["stations"][0].update(id="H9"), "station"),
+        (lambda s: s["count"].update(lower_bound=99), "lower_bound"),
+        (lambda s: s["count"].update(count=1), "count"),
+        (lambda s: s.update(n_reference=3), "n_reference"),
+        (lambda s: s.update(cross=True), "station"),
+        (lambda s: s.update(kind="turntable"), "axis"),
+        (
+            lambda s: s["stations"][0]["world_from_station"][0].__setitem__(3, 0.0),
+            "beside where the head holds it",
+        ),
+    ],
+)
+def test_lies_about_heads_are_found(plan, handmade, change, told):
+    lie = handmade.tampered(plan, lambda document: change(document["stations"]))
+    failures = audit_plan(lie, n_samples=2000).failures
+    assert any(told in failure for failure in failures)
+
+
+def test_a_pair_across_heads_measures_nothing(plan, handmade):
+    """Without names of stations more is measured than was claimed, or as much."""
+
+    def unnamed(document):
+        for device in (*document["projectors"], *document["cameras"]):
+            device.pop("station")
+
+    alone = audit_plan(plan, n_samples=4000).case.actual
+    across = audit_plan(handmade.tampered(plan, unnamed), n_samples=4000).case.actual
+    for p, projector in enumerate(plan.projectors):
+        for c, camera in enumerate(plan.cameras):
+            measured = (alone.pairs[p, c] == alone.pairs.max()).any()
+            if not meet(projector.station, camera.station):
+                assert not measured
+    assert (across.pairs >= alone.pairs).all()
+    assert (across.pairs > alone.pairs).any()
+
+
+def test_stations_of_one_head_are_in_the_order_of_the_shortest_way(few):
+    rig = head_rig(stations={"carrier": "robot"})
+    carried = planned(rig, max_heads=9)
+    told = carried.document.stations
+    places = np.array([np.array(s.world_from_station)[:3, 3] for s in told.stations])
+    assert told.kind == "stations"
+    assert told.way_m == pytest.approx(
+        float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum()), abs=1e-4
+    )
+    # One head can't shine from two places at once.
+    groups = carried.document.firing_schedule.groups
+    assert all(len(group) == 1 for group in groups)
+    assert audit_plan(carried, n_samples=4000).failures == ()
+
+
+def test_too_few_heads_measure_what_they_can_and_say_how_many_would(few):
+    short = planned(head_rig(), max_heads=1)
+    count = short.document.stations.count
+    assert (len(short.projectors), len(short.cameras)) == (1, 2)
+    assert count.needed > 1
+    assert count.lower_bound > 1
+
+
+def test_the_plan_is_the_same_with_two_threads(plan):
+    again = planned(head_rig(head={"body": _BODY}), max_heads=9, threads=2)
+    assert len(again.projectors) == len(plan.projectors)
+    for a, b in zip(again.projectors, plan.projectors, strict=True):
+        assert np.array_equal(a.world_from_device, b.world_from_device)
+
+
+@pytest.mark.parametrize(
+    ("rig", "asked", "told"),
+    [
+        ({}, {"max_projectors": 2}, "max_heads"),
+        ({}, {"max_heads": 2, "pattern": "rings"}, "dense"),
+        ({}, {"max_heads": 2, "views": 2}, "views"),
+        ({}, {"max_heads": 2, "survive": 1}, "survive"),
+        ({}, {"max_heads": 2, "robust": 0.9}, "robust"),
+        ({}, {"max_heads": 0}, "1 or more"),
+        ({"stations": {"carrier": "tripod", "max": 3}}, {"max_heads": 4}, "allows 3"),
+        (
+            {"turntable": {"point_mm": [0, 0, 0], "axis": [0, 0, 1], "steps": 4}},
+            {"max_heads": 2},
+            "one of both",
+        ),
+        ({"head": {"cross": True, "body": _BODY}}, {"max_heads": 2}, "cross"),
+    ],
+)
+def test_what_cannot_be_asked_of_heads_is_told_in_one_line(rig, asked, told):
+    tables = dict(rig)
+    head = tables.pop("head", None)
+    with pytest.raises(InputError, match=told) as error:
+        planned(head_rig(head=head, **tables), **asked)
+    assert "\n" not in str(error.value)
+
+
+def test_heads_need_a_rig_that_has_one():
+    from planning import load_rig
+
+    with pytest.raises(InputError, match=r"no \[head\]"):
+        planned(load_rig("default"), max_heads=2)

@@ -1,0 +1,126 @@
+"""The fewest steps of small tables, against every choice of places and angles."""
+
+from itertools import combinations, product
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from geometry.mesh.sampling import SurfaceSamples
+from planning.cameras.stations.heads.head_cover import HeadCover
+from planning.cameras.stations.turntable.fewest_steps import StepSearch, _together
+from planning.cameras.stations.turntable.table_sets import TableSets
+from planning.scene.samples import Target
+
+ANGLES, CIRCLES, N = 6, 2, 40
+
+
+class _Lattice:
+    """Places alone: six on each of two circles, cameras one place on at most."""
+
+    n_places = ANGLES
+    offsets = np.array([-1, 0, 1])
+    projectors = cameras = (None,) * CIRCLES
+
+    def __init__(self, room=None):
+        self.room = np.ones(ANGLES, dtype=bool) if room is None else room
+
+    def begins(self, devices):
+        free = [np.roll(self.room, -place) for _, place in devices]
+        return np.flatnonzero(np.all(free, axis=0))
+
+
+def _search(seed, *, room=None, coverage=0.8):
+    rng = np.random.default_rng(seed)
+    lit = rng.random((CIRCLES, ANGLES, N)) < 0.5
+    measured = rng.random((CIRCLES, ANGLES, CIRCLES, 3, N)) < 0.6
+    measured &= lit[:, :, None, None]
+    points = rng.normal(size=(N, 3))
+    target = Target(SurfaceSamples(points, points, np.arange(N), 1.0), 0.0 * points)
+    required = SimpleNamespace(
+        dominant_coverage=0.6, coverage=coverage, region_coverage=0.0
+    )
+    scene = SimpleNamespace(requirements=required, seed=0, check_cancelled=lambda: None)
+    return StepSearch.of(scene, TableSets(_Lattice(room), target, lit, measured))
+
+
+def _enough(search, lamps, eyes, angles):
+    """By the tensors alone: what any pair does at any of the angles."""
+    sets, lattice = search.sets, search.sets.lattice
+    lit, measured = np.zeros((2, N), dtype=bool)
+    for j, (e, i) in product(angles, lamps):
+        lit |= sets.lit[e, (i - j) % ANGLES]
+        for f, k in eyes:
+            apart = (k - i + ANGLES // 2) % ANGLES - ANGLES // 2
+            for column in np.flatnonzero(lattice.offsets == apart):
+                measured |= sets.measured[e, (i - j) % ANGLES, f, column]
+    asked = search.cover.asked
+    return lit.sum() >= asked[0] and measured.sum() >= asked[1]
+
+
+def _brute(search, n_lamps, n_eyes):
+    """The fewest angles over all places of all devices; None: never enough."""
+    places = list(product(range(CIRCLES), range(ANGLES)))
+    for count in range(1, ANGLES + 1):
+        for lamps in combinations(places, n_lamps):
+            for eyes in combinations(places, n_eyes):
+                devices = [(None, place) for _, place in (*lamps, *eyes)]
+                if not len(search.sets.lattice.begins(devices)):
+                    continue
+                for angles in combinations(range(ANGLES), count):
+                    if _enough(search, lamps, eyes, angles):
+                        return count
+    return None
+
+
+@pytest.mark.parametrize("seed", [0, 1, 5])
+@pytest.mark.parametrize(("n_lamps", "n_eyes"), [(1, 1), (1, 2), (2, 1)])
+def test_the_fewest_steps_are_those_of_all_choices(seed, n_lamps, n_eyes):
+    search = _search(seed)
+    steps, least = search.fewest(n_lamps, n_eyes, ANGLES)
+    truth = _brute(search, n_lamps, n_eyes)
+    if truth is None:
+        assert steps is None
+        assert least > ANGLES
+        return
+    assert len(steps.angles) == truth == least == steps.lower_bound
+    assert (len(steps.lamps), len(steps.eyes)) == (n_lamps, n_eyes)
+    assert _enough(search, steps.lamps, steps.eyes, steps.angles)
+
+
+def test_devices_stand_where_the_room_lets_them():
+    room = np.array([True, True, False, False, False, False])
+    search = _search(2, room=room, coverage=0.6)
+    steps, _ = search.fewest(1, 1, ANGLES)
+    assert all(room[place] for _, place in (*steps.lamps, *steps.eyes))
+    assert _enough(search, steps.lamps, steps.eyes, steps.angles)
+    assert len(steps.angles) == _brute(search, 1, 1)
+
+
+def test_fewer_steps_than_it_takes_are_none_and_the_bound_says_so():
+    search = _search(0)
+    steps, _ = search.fewest(1, 1, ANGLES)
+    none, least = search.fewest(1, 1, len(steps.angles) - 1)
+    assert none is None
+    assert least == len(steps.angles)
+
+
+def test_what_is_asked_is_a_share_of_what_any_pair_measures():
+    search = _search(5)
+    everything = search.sets.measured.any(axis=(0, 1, 2, 3)).sum()
+    assert search.cover.asked[1] == int(np.ceil(0.8 * everything - 1e-9))
+    assert isinstance(search.cover, HeadCover)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_rows_that_hold_enough_together_are_all_found(count):
+    rng = np.random.default_rng(count)
+    rows = rng.random((7, 24)) < 0.35
+    bits, asked = np.packbits(rows, axis=1), 15
+    found = set(_together(bits, count, asked))
+    truth = {
+        chosen
+        for chosen in combinations(range(7), count)
+        if rows[list(chosen)].any(axis=0).sum() >= asked
+    }
+    assert {tuple(sorted(chosen)) for chosen in found} == truth
