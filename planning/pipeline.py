@@ -26,11 +26,13 @@ from planning.scene.interest import Select, Weight
 from planning.scene.ranges.ranged_body import RangedBody
 from planning.verify.verification import Verification, verify_plan
 
-from .steps.carried import check_carried, devices_of_heads, pattern_of_rig
+from .steps.cameras_alone.stages import planned_alone
+from .steps.carried import devices_of_heads, pattern_of_rig
 from .steps.checked import axes_may_help, missed_by, with_check
 from .steps.heads import planned_heads
 from .steps.joint.joining import jointly
 from .steps.prepare import prepared, request_of, standing_devices
+from .steps.refused import check_request
 from .steps.stages import (
     bounded_cameras,
     bounded_projectors,
@@ -41,11 +43,7 @@ from .steps.stages import (
     with_free_axes,
 )
 from .steps.standing import as_they_stand
-from .steps.surviving import (
-    check_survival,
-    one_more_for_losses,
-    placed_to_survive,
-)
+from .steps.surviving import one_more_for_losses, placed_to_survive
 from .steps.turntable import planned_on_turntable
 
 Keep = Callable[[RigPlan], None]
@@ -99,7 +97,7 @@ def plan_rig(
         max_projectors: Projectors at most; None, and no heads either: the fixed devices
             and those of the rig file are evaluated as they stand. None is sought or
             moved, nothing is proved of their number, and limits of the workspace that
-            they break are told and refuse nothing.
+            they break are told and refuse nothing. 0 with the pattern `none`.
         max_cameras: Cameras at most; None: as many as the coverage needs.
         max_heads: Instead, of a rig with a `[head]`: heads at most, or its stations.
         target: The `dominant` regions, or the whole `surface`; None: the former, and
@@ -120,13 +118,15 @@ def plan_rig(
             errors are smallest, or `auto`; None: the rig's.
         robust: Share of drawn rigs that meet the requirements; None: none is drawn.
         views: Different pairs of projector and camera, at least, that measure what
-            counts as covered; None: one.
+            counts as covered; None: one. Of the pattern `none` cameras that see it, of
+            which some pair measures it; None: two.
         survive: Devices, 0 or 1, of which any may be lost: what is left still meets
             the requirements.
         joint: Whether projectors and cameras are then sought together, the cheapest,
             and moved together (`docs/method/joint.md`).
         pattern: What projectors show: `rings`, or a `dense` code of every pixel; None:
-            that, where the rig has a head or a turntable.
+            that, where the rig has a head or a turntable; `none`: there is no
+            projector, and pairs of cameras measure by the object's texture.
         seed: The same seed gives the same plan.
         threads: Worker threads; no result depends on it. None: one for each core.
         check: Whether the plan is audited and reconstructed from pixels.
@@ -194,18 +194,19 @@ def plan_rig(
             mounted=fixed,
             evaluates=evaluates,
         )
-        check_carried(request)
-        check_survival(request)
+        check_request(request)
         planned = jointly(_evaluated if evaluates else robustly(_planned))
+        if wishes.pattern == "none":
+            planned = planned_alone
         plan, partial = planned(request, clock, keep)
         if check and not plan.document.truncated:
-            plan = _checked(plan, partial, clock, keep, checked)
-            if axes_may_help(plan, partial):
+            plan = _checked(plan, request.threads, clock, keep, checked)
+            if partial is not None and axes_may_help(plan, partial):
                 clock.say("  centred ring axes don't pass the check: free ones")
                 freed = replace(request, axis_wanted="free")
                 other, partial = planned(freed, clock, keep)
                 if not other.document.truncated:
-                    other = _checked(other, partial, clock, keep, checked)
+                    other = _checked(other, request.threads, clock, keep, checked)
                     plan = plan if missed_by(other, check=True) else other
     missed = missed_by(plan, check=check)
     if missed and on_miss == "raise":
@@ -287,7 +288,7 @@ def _first_plan(request: PlanRequest, clock: Stopwatch) -> PartialPlan:
 
 def _checked(
     plan: RigPlan,
-    partial: PartialPlan,
+    threads: int,
     clock: Stopwatch,
     keep: Keep | None,
     checked: Checked | None,
@@ -304,7 +305,7 @@ def _checked(
             keep(plan)
         with clock.stage("check", "check: audit, then reconstruction from pixels"):
             verification = verify_plan(
-                plan, threads=partial.request.threads, progress=clock.say_in_time
+                plan, threads=threads, progress=clock.say_in_time
             )
     except KeyboardInterrupt:
         raise InterruptedPlanError(cut) from None
@@ -312,4 +313,4 @@ def _checked(
         return cut
     if checked is not None:
         checked(plan, verification)
-    return with_check(plan, verification, partial, clock)
+    return with_check(plan, verification, clock)

@@ -58,8 +58,8 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
     limit = None if limit is None else _OURS * limit
     clock = Stopwatch(time_limit=limit, begin=begin)
     path = Path(options["ranges"] or options["meshes"][0])
-    planned = options["max_projectors"] or options["max_heads"]
-    result = "plan" if planned else "evaluation"
+    evaluates = options["max_projectors"] is None and options["max_heads"] is None
+    result = "evaluation" if evaluates else "plan"
     folder = options["output"] or Path(f"{path.name.split('.')[0]}-{result}")
     threads = options["threads"] or n_threads()
     check, interrupted = not options["no_check"], False

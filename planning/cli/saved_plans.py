@@ -96,7 +96,7 @@ class SavedPlans:
                 self._report("drawing")
                 picture = draw_rig(plan, face_status=face_status(plan))
                 save_picture(picture, fresh / "rig.png", plan.digest)
-                if self._patterns:
+                if self._patterns and not plan.cameras_alone:
                     write_patterns(Scanner.of(plan), fresh)
                 # No cut between what stands there and what is known of it.
                 quiet.enter_context(untimed())

@@ -97,9 +97,10 @@ def _tables(settings: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
 def _figures(plan: HandedPlan) -> Row:
     proofs, areas = plan.document.certificates, plan.coverage.target
     sigma, missed = plan.coverage.sigma, plan.missed
+    lights = proofs.projectors
     return {
         "projectors": len(plan.projectors),
-        "projectors_least": proofs.projectors.needed.lower_bound,
+        "projectors_least": 0 if lights is None else lights.needed.lower_bound,
         "cameras": len(plan.cameras),
         "cameras_least": proofs.cameras.needed.lower_bound,
         "lit": areas.lit_m2 / max(areas.reachable_by_projectors_m2, 1e-12),

@@ -46,6 +46,11 @@ class RigPlan:
         """What was asked of the plan."""
         return self.document.requirements
 
+    @property
+    def cameras_alone(self) -> bool:
+        """Whether there is no projector, and pairs of cameras measure by texture."""
+        return self.requirements.pattern == "none"
+
     @cached_property
     def projectors(self) -> tuple[PlannedProjector, ...]:
         """The projectors, in the order of the file."""

@@ -265,14 +265,14 @@ class Requirements:
         dominant_coverage: Lit area / area reachable by projectors, on the target.
         min_reachable: Area reachable by projectors / target area.
         target: `dominant` regions, or the whole `surface`.
-        pattern: `rings`, or a `dense` code of every pixel; `none` comes later.
+        pattern: `rings`, a `dense` code of every pixel, or `none`, cameras alone.
         existing: Devices that stand already and are part of every plan.
-        region_coverage: Floor of each dominant region: lit area / area reachable by
-            projectors, and measured area / area reachable by cameras; 0: no floor.
+        region_coverage: Floor of lit / reachable and of measured / reachable in each.
         region_share: Regions of at least this share of the target's area have it.
         robust: What drawn rigs must meet, where the rest is tightened for it.
         stock: Models of which there are so many and no more.
         survival: Pairs that must measure what counts, and losses to survive.
+        min_views: Cameras that must see what counts, of `none`.
     """
 
     max_projectors: int
@@ -293,6 +293,7 @@ class Requirements:
     robust: Robust | None = None
     stock: tuple[Stock, ...] = ()
     survival: Survival | None = None
+    min_views: int | None = None
 
     def stock_of(self, kind: str) -> dict[str, int]:
         """Return how many there are of each counted model of a kind."""
@@ -303,13 +304,12 @@ class Requirements:
         return tuple(device for device in self.existing if device.kind == kind)
 
     def to_document(self) -> dict[str, Any]:
-        """Return plain JSON values."""
-        # By way of JSON, which turns tuples to lists and keeps every float.
+        """Return plain JSON values: tuples become lists, every float is kept."""
         document = json.loads(json.dumps(asdict(self)))
         devices = [(device, _OF_ITS_OWN) for device in document["existing"]]
         tables = [
             (document["workspace"], _LEFT_OUT),
-            (document, ("existing", "robust", "stock", "survival")),
+            (document, ("existing", "robust", "stock", "survival", "min_views")),
             (document["triangulation"], ("light",)),
             (document["projector"], ("max_sample_distance_m",)),
         ]

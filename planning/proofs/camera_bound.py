@@ -27,6 +27,7 @@ from planning.proofs.cells.direction_cells import mesh_reach, open_samples
 from planning.proofs.cells.image_cone import image_cone
 from planning.proofs.cells.measurable_cells import MeasurableCells
 from planning.proofs.cells.position_cells import PositionTree
+from planning.proofs.cells.seen_cells import SeenCells
 from planning.scene.measured import LitSamples
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
@@ -89,9 +90,17 @@ def camera_trees(
     Cells of positions; finer ones among shadows; the same by aim, if that is of use.
     """
     space, drawn = scene.requirements.workspace, samples.target.samples
-    limits = MeasurableCells(
-        samples, scene.requirements, devices, check_cancelled=scene.check_cancelled
-    )
+    if scene.requirements.pattern == "none":
+        limits = SeenCells(
+            samples.target,
+            scene.requirements,
+            devices,
+            check_cancelled=scene.check_cancelled,
+        )
+    else:
+        limits = MeasurableCells(
+            samples, scene.requirements, devices, check_cancelled=scene.check_cancelled
+        )
     ends = [device.range_m for device in devices]
     reaches = min(low for low, _ in ends), max(high for _, high in ends)
 

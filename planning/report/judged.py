@@ -10,6 +10,7 @@ from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.scene.lighting import lit_stages
 from planning.scene.limits import pair_limits, projector_limits
 from planning.scene.limits.projector_limits import LIT
+from planning.scene.limits.view_pair_limits import VIEW_CAUSES
 from planning.scene.measured import LitSamples, furthest_failure, measured_by
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
@@ -17,7 +18,9 @@ from planning.scene.scene import Scene
 from .reach import furthest_lit, measured_by_any
 
 _Mask = NDArray[np.bool_]
-_CAUSES = tuple(dict.fromkeys(projector_limits.CAUSES + pair_limits.CAUSES))
+_CAUSES = tuple(
+    dict.fromkeys(projector_limits.CAUSES + pair_limits.CAUSES + VIEW_CAUSES)
+)
 
 
 @dataclass(frozen=True, eq=False)

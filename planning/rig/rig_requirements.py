@@ -23,15 +23,15 @@ from planning.model.requirements import (
 from planning.scene.workspace.zone_conflicts import check_zones
 
 from .rig_tables import LimitsTable, RequirementsTable, RigTable
-from .wishes import Pattern, Wishes
+from .wishes import MOST_VIEWS, Pattern, Wishes, check_counts, views_alone
 
 _Limits = TypeVar("_Limits", ProjectorLimits, CameraLimits, TriangulationLimits)
 
 _WARN_INCIDENCE_DEG = 70.0
-# Pairs that may be asked for of each point: more are no survival but another rig.
-MOST_VIEWS = 8
 # Triangulation angles where a rig states none: errors grow as 1 / sin beyond [rad].
+# Of cameras alone images differ too much to be matched, docs/method/photogrammetry.md.
 _ANGLES = (math.radians(10.0), math.radians(90.0))
+_ANGLES_OF_VIEWS = (math.radians(10.0), math.radians(60.0))
 
 _UP_VECTORS = {
     **{"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)},
@@ -56,11 +56,9 @@ def build_requirements(
     shares = table.requirements
     target = wishes.target or "dominant"
     _check_choice("target", target, ("dominant", "surface"))
-    _check_choice("pattern", wishes.pattern, ("rings", "dense"))
-    for name in ("max_projectors", "max_cameras"):
-        most = getattr(wishes, name)
-        if most is not None and not most >= 1:
-            raise InputError(f"{name} = {most} must be 1 or more")
+    _check_choice("pattern", wishes.pattern, ("rings", "dense", "none"))
+    check_counts(wishes)
+    alone = wishes.pattern == "none"
     _check_positive("tau_m", tau_m)
     _check_choice("accuracy_of", wishes.accuracy_of, ("noise", "total"))
     triangulation = _limits_of(
@@ -97,7 +95,8 @@ def build_requirements(
         workspace=workspace,
         region_coverage=_share("region_coverage", wishes, shares, or_none=True),
         region_share=shares.region_share,
-        survival=_survival(wishes),
+        survival=None if alone else _survival(wishes),
+        min_views=views_alone(wishes) if alone else None,
     )
 
 
@@ -106,13 +105,17 @@ def _of_pattern(limits: TriangulationLimits, pattern: Pattern) -> TriangulationL
     if pattern == "rings":
         return replace(limits, min_angle=None, max_angle=None)
     low, high = limits.min_angle, limits.max_angle
+    least, most = _ANGLES_OF_VIEWS if pattern == "none" else _ANGLES
+    if pattern == "none":
+        # Nothing is drawn, and no projector's light is counted.
+        limits = replace(limits, drawn_edges=None, light=None)
     return replace(
         limits,
         min_conditioning=0.0,
         min_ring_pitch_px=None,
         ring_sigma_m=None,
-        min_angle=_ANGLES[0] if low is None else low,
-        max_angle=_ANGLES[1] if high is None else high,
+        min_angle=least if low is None else low,
+        max_angle=most if high is None else high,
     )
 
 

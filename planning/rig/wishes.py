@@ -4,10 +4,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 from planning.model.document.ring_records import RingAxis
+from planning.model.errors import InputError
 
 Pattern = Literal["rings", "dense", "none"]
 AccuracyOf = Literal["noise", "total"]
 TargetName = Literal["dominant", "surface"]
+# Pairs that may be asked for of each point: more are no survival but another rig.
+MOST_VIEWS = 8
 
 
 @dataclass(frozen=True)
@@ -39,3 +42,38 @@ class Wishes:
     survive: int = 0
     joint: bool = False
     max_heads: int | None = None
+
+
+def check_counts(wishes: Wishes) -> None:
+    """Refuse fewer devices than any plan has.
+
+    Raises:
+        InputError: It says how many there must be.
+    """
+    least = {"max_projectors": 1, "max_cameras": 1}
+    if wishes.pattern == "none":
+        least = {"max_projectors": 0, "max_cameras": 2}
+        if wishes.max_projectors:
+            raise InputError(
+                f"max_projectors = {wishes.max_projectors} with pattern 'none', which "
+                f"has no projector: leave it out, or make it 0"
+            )
+    for name, few in least.items():
+        most = getattr(wishes, name)
+        if most is not None and not most >= few:
+            raise InputError(f"{name} = {most} must be {few} or more")
+
+
+def views_alone(wishes: Wishes) -> int:
+    """Return how many cameras must see what counts where there is no projector.
+
+    Raises:
+        InputError: If it is fewer than two, or more than may be asked for.
+    """
+    views = 2 if wishes.views is None else wishes.views
+    if not 2 <= views <= MOST_VIEWS:
+        raise InputError(
+            f"views = {views} must be from 2 to {MOST_VIEWS} with pattern 'none': one "
+            f"camera alone measures nothing"
+        )
+    return views

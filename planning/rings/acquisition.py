@@ -17,7 +17,11 @@ def n_frames(projectors: Iterable[PlannedProjector], n_cameras: int) -> int:
     record all at once::
 
         sum_p (2 + 2 ceil(log2(n_rings + 1)) + 2 n_cameras)
+
+    Cameras alone record once.
     """
+    if not (projectors := tuple(projectors)):
+        return 1
     return sum(
         2 + 2 * code_bits(len(one.ring_radii)) + 2 * n_cameras
         if one.code is None
@@ -43,8 +47,12 @@ def frame_time(
     waits for whole refreshes::
 
         ceil(projector_hz max(1 / camera_hz, exposure_s)) / projector_hz
+
+    Where there is none, of infinite rate, only the camera takes its time.
     """
     if camera_hz is None or projector_hz is None:
         return None
+    if math.isinf(projector_hz):
+        return max(1.0 / camera_hz, exposure_s or 0.0)
     wanted = projector_hz * max(1.0 / camera_hz, exposure_s or 0.0)
     return max(math.ceil(wanted - _ROUNDING), 1) / projector_hz

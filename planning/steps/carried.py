@@ -3,9 +3,10 @@
 from planning.model.errors import InputError
 from planning.report.partial_plan import PlanRequest
 from planning.rig.rig import Rig
+from planning.rig.wishes import Pattern
 
 
-def pattern_of_rig(rig: Rig, asked: str | None) -> str:
+def pattern_of_rig(rig: Rig, asked: Pattern | None) -> Pattern:
     """Return the pattern that is asked for; of heads and turntables it is dense."""
     return asked or ("dense" if rig.head or rig.turntable else "rings")
 
@@ -69,6 +70,7 @@ def check_carried(request: PlanRequest) -> None:
         "cross = true with [stations]": bool(
             rig.head and rig.head.cross and rig.stations
         ),
+        "joint": wishes.joint,
         "[photometry]": rig.table.photometry is not None,
     }
     for asked, there in unable.items():

@@ -8,9 +8,7 @@ from planning.report.summary.shortfall import shortfalls
 from planning.verify.verification import Verification
 
 
-def with_check(
-    plan: RigPlan, verification: Verification, partial: PartialPlan, clock: Stopwatch
-) -> RigPlan:
+def with_check(plan: RigPlan, verification: Verification, clock: Stopwatch) -> RigPlan:
     """Return the plan with the record of its check, false claims among the failures."""
     check, record = verification.reconstruction, None
     if check is not None:
@@ -19,7 +17,7 @@ def with_check(
         record = record.changed(
             failures=(*false, *record.failures), passed=record.passed and not false
         )
-    greedy = partial.camera_stage.certificate.greedy_count
+    greedy = plan.document.certificates.cameras.greedy_count
     (member,) = plan.document.members
     document = plan.document.changed(
         reconstruction=record,

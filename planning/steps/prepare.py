@@ -149,13 +149,15 @@ def prepared(request: PlanRequest, clock: Stopwatch) -> Prepared:
             model=model.name,
             code=code,
         )
-        for model in rig.projector_models
+        for model in (
+            (*rig.projector_models,) if requirements.pattern != "none" else ()
+        )
     )
     cameras = tuple(
         PlannedCamera("", np.eye(4), device, body=model.body, model=model.name)
         for model, device in zip(rig.camera_models, rig.optics[1], strict=True)
     )
-    if not request.evaluates:
+    if requirements.existing and not request.evaluates:
         check_existing_clearance(scene, templates, cameras)
     return Prepared(request, scene, regions, field.radius, templates, cameras)
 

@@ -10,6 +10,7 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples, sample_surface
 from geometry.parallel import n_threads
 from geometry.rays.proximity import closest_points
+from planning.model.errors import InputError
 from planning.model.plan import RigPlan
 from planning.model.words import count_words
 from planning.verify.audit.audit import Audit, audit_plan
@@ -23,6 +24,7 @@ from planning.verify.reconstruction.check.interreflection import (
     interreflection,
 )
 from planning.verify.reconstruction.check.result import Reconstruction
+from planning.verify.reconstruction.check.view_check import Ball, reconstruct_views
 from planning.verify.reconstruction.reconstruct import reconstruct
 from planning.verify.reconstruction.render.countdown import countdown
 from planning.verify.reconstruction.render.mitsuba.physics import Physics
@@ -81,8 +83,10 @@ class Verification:
 
     def summary(self) -> str:
         """Return the verdict for a person, in a few lines."""
+        alone = self.audit.case.plan.cameras_alone
         lines = [
-            _areas_line(name, self.coverage[name]) for name in ("target", "surface")
+            _areas_line(name, self.coverage[name], alone=alone)
+            for name in ("target", "surface")
         ]
         lines.append(_pixels_line(self.reconstruction))
         bounced = self.reconstruction and self.reconstruction.record().interreflection
@@ -206,29 +210,52 @@ def _reconstruct(
     say: Callable[[str], None],
     how: Mapping[str, Any],
 ) -> Reconstruction:
+    if plan.cameras_alone and how["physics"] is not None:
+        raise InputError(
+            "physics is of light that projectors show, and this plan's pattern is "
+            "'none'; leave it out"
+        )
     standing = None if truth is None and mesh is None else Scanner.of(truth or plan)
     if standing is not None and mesh is not None:
         standing = replace(standing, mesh=mesh)
     case, believed = audit.case, Scanner.of(plan)
     samples = bare(case.samples)
-    pixels = reconstruct(
-        believed,
-        seed=seed,
+    expected = Expected(samples, case.actual.measured, case.actual.by_pair)
+    told = countdown(
+        lambda line: say(f"pixels: {line}"),
+        n_cameras=len(believed.cameras),
         threads=threads,
-        truth=standing,
-        expected=Expected(samples, case.actual.measured, case.actual.by_pair),
-        progress=countdown(
-            lambda line: say(f"pixels: {line}"),
-            n_cameras=len(believed.cameras),
-            threads=threads,
-        ),
-        **how,
     )
+    if plan.cameras_alone:
+        space = plan.requirements.workspace
+        pixels = reconstruct_views(
+            believed,
+            Ball(np.array(space.centre), space.object_radius_m),
+            seed=seed,
+            threads=threads,
+            truth=standing,
+            expected=expected,
+            photometry=how["photometry"],
+            progress=told,
+        )
+    else:
+        pixels = reconstruct(
+            believed,
+            seed=seed,
+            threads=threads,
+            truth=standing,
+            expected=expected,
+            progress=told,
+            **how,
+        )
     possible = possible_at_floors(plan, case.samples, threads=threads)
     prediction = PredictedSamples(
         samples, case.samples.weights, case.actual.measured_by, possible
     )
     compared = compare(believed, prediction, pixels.everything, pixels.accuracy)
+    if plan.cameras_alone:
+        # Light that falls evenly has bounced already.
+        return replace(pixels, comparison=compared)
     physics, stated = how["physics"], believed.light
     albedo = ALBEDO if stated is None else stated.albedo[1]
     if physics is not None:
@@ -249,8 +276,14 @@ def _apart(mesh: TriangleMesh, other: TriangleMesh) -> float:
     return float(np.abs(closest_points(other, points).distances).max())
 
 
-def _areas_line(name: str, areas: Mapping[str, float]) -> str:
+def _areas_line(name: str, areas: Mapping[str, float], *, alone: bool) -> str:
     cm2 = {key: f"{1e4 * area:.2f}" for key, area in areas.items()}
+    if alone:
+        return (
+            f"{name} {cm2['area_m2']} cm², recomputed: "
+            f"{cm2['reachable_by_cameras_m2']} reachable by cameras, "
+            f"{cm2['measured_m2']} measured"
+        )
     return (
         f"{name} {cm2['area_m2']} cm², recomputed: "
         f"{cm2['reachable_by_projectors_m2']} reachable by projectors, "

@@ -240,7 +240,7 @@ def test_a_signal_while_a_plan_is_saved_costs_no_second_saving(
         (
             ["--mesh", "FACE", "--max-projectors", 3, "--pattern", "none"],
             2,
-            "isn't built yet",
+            "which has no projector",
         ),
         (
             ["--mesh", "FACE", "--mesh", "FACE", "--max-projectors", 3],

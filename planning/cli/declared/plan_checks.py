@@ -17,17 +17,13 @@ def check_options(options: dict[str, Any]) -> None:
     if options["unit"] and options["size_mm"] is not None:
         raise click.UsageError("give --unit or --size-mm, not both")
     _check_target(options)
-    if options["max_heads"] is None and options["max_projectors"] is None:
-        raise click.UsageError("give --max-projectors N, or --max-heads N of a [head]")
     if options["max_heads"] is not None:
         for name in ("max_projectors", "max_cameras"):
             if options[name] is not None:
                 raise click.UsageError(
                     f"give --max-heads or --{name.replace('_', '-')}, not both"
                 )
-    if options["pattern"] == "none":
-        raise click.UsageError("--pattern none isn't built yet: use rings or dense")
-    if options["pattern"] == "dense":
+    if options["pattern"] in ("dense", "none"):
         _check_without_rings(options)
 
 
@@ -44,6 +40,31 @@ def _check_source(options: dict[str, Any]) -> None:
     if len(meshes) > 1 or os.path.isdir(meshes[0]):
         raise click.UsageError(
             "several meshes on one rig aren't built yet: give one file"
+        )
+
+
+def check_projectors(options: dict[str, Any]) -> None:
+    """Refuse a plan without a number of projectors, or with one and none to count."""
+    most = options["max_projectors"]
+    if options["pattern"] == "none":
+        if most:
+            raise click.UsageError(
+                f"--max-projectors {most} with --pattern none, which has no projector: "
+                f"leave it out"
+            )
+        if options["max_heads"] is not None:
+            raise click.UsageError(
+                "--max-heads with --pattern none: heads have projectors; leave one out"
+            )
+        options["max_projectors"] = 0
+    elif most is None:
+        if options["max_heads"] is None:
+            raise click.UsageError(
+                "give --max-projectors N, or --max-heads N of a [head]"
+            )
+    elif most < 1:
+        raise click.UsageError(
+            f"Invalid value for '--max-projectors': {most} is not in the range x>=1."
         )
 
 

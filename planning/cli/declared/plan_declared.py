@@ -14,7 +14,7 @@ from planning.cli.console import (
     threads_option,
 )
 
-from .plan_checks import check_options
+from .plan_checks import check_options, check_projectors
 from .survival_options import survival_options
 
 # What `plan --help` puts together; an option of none of these is told last.
@@ -90,9 +90,9 @@ class GroupedCommand(click.Command):
 )
 @click.option(
     "--max-projectors",
-    type=click.IntRange(1),
+    type=click.IntRange(0),
     metavar="N",
-    help="Projectors at most; needed unless --max-heads is given.",
+    help="Projectors at most; needed unless --max-heads or --pattern none is given.",
 )
 @click.option(
     "--max-cameras",
@@ -137,8 +137,8 @@ class GroupedCommand(click.Command):
 @click.option(
     "--pattern",
     type=click.Choice(["rings", "dense", "none"]),
-    help="Rings, or a code of every pixel (see [dense] of the rig file) [default: "
-    "rings; of a head or a turntable dense].",
+    help="Rings, a code of every pixel (see [dense] of the rig file), or none: cameras "
+    "alone, by the object's texture [default: rings; of a head or a turntable dense].",
 )
 @click.option(
     "--ring-axis",
@@ -256,4 +256,5 @@ def rig_command(**options: Any) -> None:  # noqa: ANN401
     from planning.cli.plan_command import plan_command
 
     check_options(options)
+    check_projectors(options)
     run(lambda: plan_command(options, sys.argv[1:]), debug=options["debug"])

@@ -15,7 +15,8 @@ def survival_options(command: _Command) -> _Command:
         type=click.IntRange(1, 8),
         metavar="K",
         help="Count as covered what at least K different pairs of projector and camera "
-        "measure [default: 1].",
+        "measure [default: 1]; with --pattern none what K cameras see, some pair of "
+        "them well [default: 2].",
     )
     survive = click.option(
         "--survive",

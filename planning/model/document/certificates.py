@@ -138,7 +138,11 @@ class Certificate(Part):
 
 
 class Certificates(Part):
-    """The two certificates of a plan."""
+    """The certificates of a plan.
 
-    projectors: Certificate
+    Attributes:
+        projectors: None: the pattern `none` has no projector.
+    """
+
+    projectors: Certificate | None = None
     cameras: Certificate

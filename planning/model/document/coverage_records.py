@@ -40,8 +40,9 @@ class PredictedSigma(Part):
             the same pairs; None in plans from before.
         noise_p95_m: Likewise.
         terms_rms_m: Root mean square of each independent term: `edges`, noise of the
-            `light` and of the `phase`, `rings`, `linearity` of drawn edges, and of the
-            calibration `camera` and `projector`; absent where nothing states it.
+            `light` and of the `phase`, `rings`, `linearity` of drawn edges, noise of
+            `matches` of cameras alone, and of the calibration `camera` and `projector`;
+            absent where nothing states it.
     """
 
     median_m: float
@@ -49,7 +50,10 @@ class PredictedSigma(Part):
     noise_median_m: float | None = None
     noise_p95_m: float | None = None
     terms_rms_m: dict[
-        Literal["edges", "light", "phase", "rings", "linearity", "camera", "projector"],
+        Literal[
+            *("edges", "light", "phase", "rings", "linearity"),
+            *("matches", "camera", "projector"),
+        ],
         float,
     ] = Field(default={})
 

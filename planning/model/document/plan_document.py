@@ -3,7 +3,7 @@
 import json
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, field_serializer
+from pydantic import Field, field_serializer, model_validator
 
 from planning.model.requirements import Requirements
 
@@ -74,7 +74,11 @@ class MemberRecord(Part):
 
 
 class PlanDocument(Part):
-    """A plan as it is written; metres, radians, and pixels where named."""
+    """A plan as it is written; metres, radians, and pixels where named.
+
+    Attributes:
+        assumed: What the object or its surroundings must have, and no claim shows.
+    """
 
     format: Literal["ringrig-plan"]
     version: Literal[1]
@@ -104,10 +108,22 @@ class PlanDocument(Part):
     joint: JointRecord | None = None
     stations: StationsRecord | None = None
     camera_groups: tuple[tuple[str, ...], ...] = ()
+    assumed: tuple[str, ...] = ()
     cost: CostRecord
     members: tuple[MemberRecord, ...]
     reconstruction: ReconstructionRecord | None
     timings_s: dict[str, float]
+
+    @model_validator(mode="after")
+    def _has_certificates(self) -> Self:
+        alone = self.requirements.pattern == "none"
+        if (self.certificates.projectors is None) is not alone:
+            verb = "is there" if alone else "is missing"
+            raise ValueError(
+                f"certificates.projectors {verb}, requirements.pattern is "
+                f"{self.requirements.pattern!r}"
+            )
+        return self
 
     @field_serializer("requirements")
     def _write_requirements(self, requirements: Requirements) -> dict[str, Any]:

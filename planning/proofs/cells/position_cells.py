@@ -22,6 +22,7 @@ from solvers.bit_rows import parts
 
 from .grown_tree import GrownTree
 from .measurable_cells import MeasurableCells
+from .seen_cells import SeenCells
 from .shell_cells import Seen, ShellCells, directions_of, seen_from
 
 # Pairs of cell and sample looked at together: they stay in the second-level cache.
@@ -50,7 +51,7 @@ class PositionTree(GrownTree):
         maps: WidenedMaps | None,
         *,
         finest: int,
-        limits: MeasurableCells | None = None,
+        limits: MeasurableCells | SeenCells | None = None,
     ) -> None:
         self._workspace, self._range = workspace, range_m
         self._points = points - np.array(workspace.centre)

@@ -50,7 +50,7 @@ def with_fewer_needed(
     """Return the certificates with what would let as many as are allowed be enough."""
     required = partial.scene.requirements
     projectors, cameras = proofs.projectors, proofs.cameras
-    if _too_few(projectors, required, "projector"):
+    if projectors is not None and _too_few(projectors, required, "projector"):
         with _timed(clock):
             field = wider_field(partial.scene, partial.stage, required.max_projectors)
         if field is not None:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.parallel import n_threads
+from planning.cameras.photogrammetry.measured_views import measured_views
 from planning.model.plan import RigPlan
 from planning.scene.measured import lit_samples, measured_by
 from planning.scene.placed_bodies import Obstruction
@@ -58,6 +59,13 @@ def face_status(plan: RigPlan, *, threads: int | None = None) -> NDArray[np.int8
     scene = scene.among((*plan.projectors, *plan.cameras))
     faces = np.arange(len(mesh.faces))
     centroids = SurfaceSamples(mesh.face_centroids, mesh.face_normals, faces, 1.0)
+    if plan.cameras_alone:
+        target = Target(centroids, surface.steep)
+        measured = measured_views(scene, plan.cameras, target).measured
+        inside = surface.target_faces(required.target)
+        status = np.where(inside, NOT_MEASURED, OUTSIDE_TARGET).astype(np.int8)
+        status[measured] = MEASURED
+        return status
     lit = lit_samples(scene, plan.projectors, Target(centroids, surface.steep))
     measured = measured_by(scene, plan.cameras, lit).any(axis=1)
     inside = surface.target_faces(required.target)

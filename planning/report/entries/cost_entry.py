@@ -1,5 +1,6 @@
 """The plan's `cost`: eq. (8)."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import prod
@@ -100,7 +101,8 @@ def _frame_time(
     exposures = [one.exposure.exposure_s for one in projectors if one.exposure]
     if not exposures:
         exposures = [1e-3 * each.exposure_ms for each in eyes if each.exposure_ms]
-    return frame_time(_slowest(eyes), _slowest(lamps), max(exposures, default=None))
+    shown = _slowest(lamps) if projectors else math.inf
+    return frame_time(_slowest(eyes), shown, max(exposures, default=None))
 
 
 def _slowest(figures: Sequence[FiguresRecord]) -> float | None:

@@ -8,7 +8,7 @@ from planning.model.document.certificates import Certificate
 from planning.model.document.coverage_records import ProjectorMarginal
 from planning.model.plan import RigPlan
 from planning.model.words import area_words, percent
-from planning.report.summary.coverage_lines import AREA_ROWS
+from planning.report.summary.coverage_lines import area_rows
 from planning.report.summary.region_lines import region_place
 
 from .layers import CAUSE_WORDS
@@ -53,7 +53,7 @@ def _coverage(plan: RigPlan) -> str:
                 )
             ),
         ]
-        for label, key in AREA_ROWS.items()
+        for label, key in area_rows(plan).items()
     ]
     shares = [
         ("lit / reachable by projectors", "lit_m2", "reachable_by_projectors_m2"),
@@ -98,7 +98,9 @@ def _proofs(plan: RigPlan) -> str:
     if plan.document.evaluation is not None:
         return ""
     proofs = plan.document.certificates
-    named = (("projectors", proofs.projectors), ("cameras", proofs.cameras))
+    named = [("cameras", proofs.cameras)]
+    if proofs.projectors is not None:
+        named = [("projectors", proofs.projectors), *named]
     head = ("devices", "planned", "status", "at least, of the candidates", "candidates")
     head += ("samples", "at least, over all poses", "status there", "greedy cover")
     head += ("one fewer covers at most", "required")
@@ -177,7 +179,8 @@ def _marginal(plan: RigPlan) -> Iterator[str]:
                 ]
             )
     head = ("projectors", "target lit", "surface lit", "worst region", "lit of it")
-    yield table("One projector more or fewer", head, lit)
+    if lit:
+        yield table("One projector more or fewer", head, lit)
     head = ("cameras", "target measured", "surface measured")
     yield table("One camera more or fewer", head, measured)
 

@@ -19,6 +19,7 @@ from planning.verify.audit.predicates.predicates import (
     SEEN,
     SIGHT_CAUSES,
 )
+from planning.verify.audit.predicates.view_pairs import VIEW_CAUSES
 
 from .layers import layers
 from .payload import Payload, add_mesh
@@ -49,7 +50,10 @@ def viewer_facts(
         "mesh": box,
         "devices": [_device(device) for device in (*plan.projectors, *plan.cameras)],
         "limits": _limits(plan),
-        "causes": {"light": LIGHT_CAUSES, "sight": SIGHT_CAUSES, "pair": PAIR_CAUSES},
+        "causes": {
+            **{"light": LIGHT_CAUSES, "sight": SIGHT_CAUSES},
+            "pair": VIEW_CAUSES[1:] if plan.cameras_alone else PAIR_CAUSES,
+        },
         "layers": [layer.about for layer in ways],
         "sequence": _sequence(plan),
         "centre": list(plan.requirements.workspace.centre),
@@ -107,6 +111,8 @@ def _limits(plan: RigPlan) -> dict[str, Any]:
         "angle": list(pair.angles),
         "sigma": pair.max_sigma_m,
         "pitch": pair.min_ring_pitch_px,
+        "view_angle": list(pair.angles),
+        "view_sigma": pair.max_sigma_m,
     }
 
 

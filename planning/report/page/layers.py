@@ -12,19 +12,24 @@ from geometry.curvature.curvature import principal_curvatures
 from planning.model.plan import RigPlan
 from planning.scene.limits.pair_limits import MEASURED_LIMITS
 from planning.scene.limits.projector_limits import PROJECTOR_LIMITS
+from planning.scene.limits.view_pair_limits import VIEW_PAIR_LIMITS
 from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.predicates.predicates import (
     LIGHT_CAUSES,
     PAIR_CAUSES,
     SIGHT_CAUSES,
 )
+from planning.verify.audit.predicates.view_pairs import VIEW_CAUSES
 from planning.verify.reconstruction.check.cloud_file import BLUE_TO_RED, VIRIDIS
 
 from .payload import quantised
 from .per_face import PerFace
 
-CAUSES = LIGHT_CAUSES + SIGHT_CAUSES + PAIR_CAUSES
-CAUSE_WORDS = {limit.name: limit.words for limit in PROJECTOR_LIMITS + MEASURED_LIMITS}
+CAUSES = LIGHT_CAUSES + SIGHT_CAUSES + PAIR_CAUSES + VIEW_CAUSES
+CAUSE_WORDS = {
+    limit.name: limit.words
+    for limit in (*PROJECTOR_LIMITS, *MEASURED_LIMITS, *VIEW_PAIR_LIMITS)
+}
 # Colours of categories, told apart by lightness as well as by hue: M. Okabe, K. Ito,
 # "Color universal design", 2008, and greys.
 _APART = (
@@ -37,6 +42,7 @@ _NONE = "b9b2aa"
 _ENDS = (0.02, 0.98)
 _TERMS = {
     "edges": "noise in the image",
+    "matches": "noise of matches",
     "light": "noise of the light",
     "phase": "noise of the phase",
     "rings": "ring placement",
@@ -74,7 +80,7 @@ def layers(
             there are none, (n,) [m]; None: no check was made in this run.
     """
     areas = samples.weights
-    yield _counts(facts, areas)
+    yield _counts(facts, areas, alone=plan.cameras_alone)
     yield _causes(facts.cause(samples), areas)
     yield from _scales(facts)
     if (curved := _curvedness(plan)) is not None:
@@ -117,7 +123,7 @@ def _scale(
     )
 
 
-def _counts(facts: PerFace, areas: Array) -> Layer:
+def _counts(facts: PerFace, areas: Array, *, alone: bool) -> Layer:
     """By how many pairs measure a face."""
     counts = np.minimum(facts.n_pairs, 254)
     most = int(counts.max(initial=0))
@@ -131,7 +137,8 @@ def _counts(facts: PerFace, areas: Array) -> Layer:
         (k, f"{k} pair{'s' * (k != 1)}" if k else "none", colour(k) if k else _NONE)
         for k in range(most + 1)
     ]
-    label = "pairs of projector and camera that measure it"
+    whose = "pairs of cameras" if alone else "pairs of projector and camera"
+    label = f"{whose} that measure it"
     return _classes("pairs", label, counts.astype(np.uint8), classes, areas)
 
 

@@ -34,6 +34,16 @@ from planning.verify.audit.predicates.predicates import (
     sight_steps,
 )
 from planning.verify.audit.predicates.recompute import Recomputed
+from planning.verify.audit.predicates.recomputed_views import (
+    RecomputedViews,
+    recompute_views,
+)
+from planning.verify.audit.predicates.view_pairs import (
+    GOOD,
+    Sighted,
+    met_angle,
+    view_terms,
+)
 
 # Faces that one thread looks at together: arrays stay in the cache's reach.
 _CHUNK = 1 << 14
@@ -89,6 +99,8 @@ def centroids(plan: RigPlan) -> AuditSamples:
 
 def per_face(plan: RigPlan, samples: AuditSamples, *, threads: int) -> PerFace:
     """Recompute every device and pair on samples; no result depends on the threads."""
+    if plan.cameras_alone:
+        return views_per_face(plan, samples, threads=threads)
     shadow = Shadow.of(plan, threads=1)
     devices = audit_projectors(plan), audit_cameras(plan)
     n = len(samples)
@@ -109,6 +121,65 @@ def per_face(plan: RigPlan, samples: AuditSamples, *, threads: int) -> PerFace:
     }
     names = ("light", "sight", "pairs", "failing", "best", "sigma", "angle")
     return PerFace(**{name: joined(name) for name in names}, terms=terms)
+
+
+@dataclass(frozen=True, eq=False)
+class ViewsPerFace(PerFace):
+    """Cameras alone: of a pair the first one, p, is a camera, too.
+
+    Attributes:
+        views: As the audit recomputes them.
+    """
+
+    views: RecomputedViews
+
+    @property
+    def n_pairs(self) -> Ints:
+        """How many pairs measure each face, (n,)."""
+        pairs = np.triu(np.ones(self.views.met.shape[:2], dtype=bool))
+        return (self.views.met[pairs] == GOOD).sum(axis=0) * self.views.measured
+
+    def cause(self, samples: AuditSamples) -> NDArray[np.int64]:
+        """Return the cause of each face as the audit names it, -1 where measured."""
+        return self.views.cause.astype(np.int64)
+
+
+def views_per_face(
+    plan: RigPlan, samples: AuditSamples, *, threads: int
+) -> ViewsPerFace:
+    """Recompute every pair of cameras alone on samples."""
+    views = recompute_views(plan, samples, Shadow.of(plan, threads=threads))
+    cameras, limits = audit_cameras(plan), plan.requirements.triangulation
+    n_c, n = len(cameras), len(samples)
+    failing = np.full((n_c, n_c, n), np.nan)
+    best, least = np.full(n, -1), np.full(n, np.inf)
+    angle, terms = np.full(n, np.nan), dict[str, Array]()
+    for p in range(n_c):
+        for c in range(p + 1, n_c):
+            both = np.flatnonzero(views.met[p, c] >= 0)
+            some, passed = samples.take(both), views.met[p, c, both]
+            one, other = (Sighted.of(cameras[k], some) for k in (p, c))
+            errors = view_terms(one, other, some.normals, limits)
+            names = ("matches",) if limits.accuracy_of == "noise" else tuple(errors)
+            met, total = met_angle(one, other), deviation(errors)
+            limited = np.where(passed == 0, met, deviation(errors, names))
+            failing[p, c, both] = np.where(passed == GOOD, np.nan, limited)
+            good = (passed == GOOD) & views.measured[both]
+            better = np.flatnonzero(good & (total < least[both]))
+            rows = both[better]
+            least[rows], best[rows], angle[rows] = (
+                total[better],
+                p * n_c + c,
+                met[better],
+            )
+            for name, values in errors.items():
+                terms.setdefault(name, np.full(n, np.nan))[rows] = values[better]
+    sigma = np.where(best >= 0, least, np.nan)
+    light = np.zeros((0, n), dtype=np.int8)
+    pairs = np.where(views.met < 0, np.int8(-1), views.met + np.int8(SEEN))
+    return ViewsPerFace(
+        light, views.sight, pairs, failing, best, sigma, terms, angle, views
+    )
 
 
 def _of_chunk(

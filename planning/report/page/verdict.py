@@ -4,8 +4,9 @@ from collections.abc import Iterator
 from html import escape
 
 from planning.model.plan import RigPlan
-from planning.model.words import count_words, percent
+from planning.model.words import percent
 from planning.report.summary.check_lines import unchecked
+from planning.report.summary.device_lines import devices_words
 from planning.report.summary.shortfall import shortfalls
 
 from .markup import element, paragraphs, table
@@ -39,10 +40,9 @@ def verdict(plan: RigPlan) -> str:
 def headline(plan: RigPlan) -> str:
     """Return what the plan is, for a person, in a sentence or two."""
     document, areas = plan.document, plan.coverage.target
-    devices = (
-        f"{count_words(len(plan.projectors), 'projector')} and "
-        f"{count_words(len(plan.cameras), 'camera')}"
-    )
+    devices = f"{devices_words(plan)} with {document.rig.light} light"
+    if plan.cameras_alone:
+        devices = f"{devices_words(plan)} alone, by the object's texture,"
     target = {"dominant": "dominant regions", "surface": "whole surface"}
     sigma = plan.coverage.sigma
     exact = (
@@ -55,7 +55,7 @@ def headline(plan: RigPlan) -> str:
         )
     )
     return (
-        f"{devices} with {document.rig.light} light (rig {document.rig.name!r}) "
+        f"{devices} (rig {document.rig.name!r}) "
         f"measure {percent(areas.measured_m2 / max(areas.area_m2, 1e-300))} of the "
         f"target, the {target[plan.requirements.target]}.{exact}"
     )
@@ -67,7 +67,7 @@ def _rows(plan: RigPlan) -> Iterator[tuple[str, str, str, str]]:
         ("projectors", asked.max_projectors, len(plan.projectors)),
         ("cameras", asked.max_cameras, len(plan.cameras)),
     ):
-        if most is not None:
+        if most is not None and not (plan.cameras_alone and kind == "projectors"):
             yield kind, f"at most {most}", str(have), _judged(have <= most)
     for what, part, whole, least in (
         (
@@ -77,7 +77,8 @@ def _rows(plan: RigPlan) -> Iterator[tuple[str, str, str, str]]:
             asked.min_reachable,
         ),
         (
-            "what is lit within reach of cameras",
+            f"{'target' if plan.cameras_alone else 'what is lit'} within reach of "
+            f"cameras",
             areas.reachable_by_cameras_m2,
             areas.lit_m2,
             asked.min_reachable,
@@ -96,6 +97,8 @@ def _rows(plan: RigPlan) -> Iterator[tuple[str, str, str, str]]:
         ),
     ):
         share = part / whole if whole > 0.0 else 0.0
+        if plan.cameras_alone and "projectors" in what:
+            continue
         yield (
             what,
             f"at least {percent(least)}",

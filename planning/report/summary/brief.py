@@ -19,11 +19,11 @@ from planning.report.tolerance.survival_lines import counted_words, losses_words
 
 from .cause_words import causes_line
 from .check_lines import error_words, unchecked
-from .device_lines import axis_name, models_line, standing, used_up
-from .proof_lines import user_selection
+from .device_lines import axis_name, devices_words, models_line, standing, used_up
+from .proof_lines import target_words
 from .region_lines import worst_region
 from .shortfall import Shortfall, missing
-from .station_lines import device_counts, fewest_words, title_words
+from .station_lines import fewest_words, title_words
 from .summary import lost_in_field
 from .warning_lines import warnings
 
@@ -75,19 +75,11 @@ def _block(label: str, text: str, most: int) -> list[str]:
 
 def _head(plan: RigPlan, short: Sequence[Shortfall]) -> Iterator[_Block]:
     document, rig = plan.document, plan.document.rig
-    n_projectors, n_cameras = device_counts(plan)
-    devices = (
-        f"{count_words(n_projectors, 'projector')} and "
-        f"{count_words(n_cameras, 'camera')}"
-    )
+    devices = devices_words(plan)
     if document.stations is not None:
         devices = f"{title_words(document.stations)} ({devices})"
-    state = unchecked(plan)
-    if document.truncated:
-        state = f"TRUNCATED{', NOT CHECKED' * bool(state)}"
-    state = f", {state}" if state else ""
-    path = document.meshes[0].path
-    name = "the mesh" if path is None else Path(path).name
+    state = f", {_state(plan)}" if _state(plan) else ""
+    name = Path(document.meshes[0].path or "the mesh").name
     if short:
         figures = [one.figure for one in short[:2]]
         more = f"; and {len(short) - 2} more" if len(short) > 2 else ""
@@ -95,31 +87,26 @@ def _head(plan: RigPlan, short: Sequence[Shortfall]) -> Iterator[_Block]:
         yield "NOT MET", verdict, 2
     else:
         stand = document.evaluation
-        as_built = "" if stand is None else f", as they stand in {stand.path}"
+        as_built = f", as they stand in {stand.path}" if stand else ""
         yield "OK", f"{devices} measure {name} as asked{as_built}{state}", 2
     x, y, z = np.diff(plan.surface.mesh.bounds, axis=0)[0] * 1e3
     up = axis_name(plan.requirements.workspace.up)
     yield (
         "",
         f"{x:.0f} x {y:.0f} x {z:.0f} mm, up {up}, rig {rig.name}; target: "
-        f"{_target(plan)}{lost_in_field(plan)}",
+        f"{target_words(plan)}{lost_in_field(plan)}",
         2,
     )
     for line in warnings(plan)[:2]:
         yield "WARNING", line, 1
+    if document.assumed:
+        yield "ASSUMED", f"{'; '.join(document.assumed)}", 2
 
 
-def _target(plan: RigPlan) -> str:
-    """Say what is to be measured, and how all of it is asked for."""
-    coverage = plan.coverage
-    share = percent(coverage.target.area_m2 / coverage.surface.area_m2, decimals=0)
-    if user_selection(plan) is not None:
-        return f"the {share} of the surface that you chose"
-    if plan.requirements.target == "surface":
-        return "the whole surface"
-    if coverage.target.area_m2 > 0.995 * coverage.surface.area_m2:
-        return "the whole surface, as it is curved alike all over"
-    return f"{share} of highest curvature (--target surface: all)"
+def _state(plan: RigPlan) -> str:
+    state = unchecked(plan)
+    cut = f"TRUNCATED{', NOT CHECKED' * bool(state)}"
+    return cut if plan.document.truncated else state
 
 
 def _devices(plan: RigPlan, room: int) -> list[str]:
@@ -158,10 +145,12 @@ def _measured(plan: RigPlan) -> Iterator[_Block]:
     sigma, limit = plan.coverage.sigma, asked.triangulation.max_sigma_m
     lit = _share(areas.lit_m2, areas.reachable_by_projectors_m2)
     seen = _share(areas.measured_m2, areas.reachable_by_cameras_m2)
+    first = f"lit {lit} ({100 * asked.dominant_coverage:g} asked) and measured"
+    if plan.cameras_alone:
+        first = f"by pairs, {asked.min_views} cameras or more seeing it, measured"
     text = (
         f"{_share(areas.measured_m2, areas.area_m2)} of the target; of what can be, "
-        f"lit {lit} ({100 * asked.dominant_coverage:g} asked) and measured {seen} "
-        f"({100 * asked.coverage:g})"
+        f"{first} {seen} ({100 * asked.coverage:g})"
     )
     yield "MEASURED", text, 2
     if sigma is None:
@@ -187,11 +176,13 @@ def _fewest(plan: RigPlan) -> Iterator[_Block]:
         yield "FEWEST", fewest, 2
         return
     proofs = plan.document.certificates
-    kinds = {"projector": proofs.projectors, "camera": proofs.cameras}
+    kinds = {"camera": proofs.cameras}
+    if proofs.projectors is not None:
+        kinds = {"projector": proofs.projectors, **kinds}
     if plan.document.survival is not None:
         yield from zip(("FEWEST", ""), counted_words(plan), (2, 2), strict=True)
         return
-    if all(_over_all(proof) for proof in kinds.values()):
+    if len(kinds) > 1 and all(_over_all(proof) for proof in kinds.values()):
         counts = [count_words(proof.count, kind) for kind, proof in kinds.items()]
         yield (
             "FEWEST",
@@ -200,7 +191,7 @@ def _fewest(plan: RigPlan) -> Iterator[_Block]:
             2,
         )
         return
-    for label, (kind, proof) in zip(("FEWEST", ""), kinds.items(), strict=True):
+    for label, (kind, proof) in zip(("FEWEST", ""), kinds.items(), strict=False):
         yield label, _proved(kind, proof, used_up(plan.document, kind)), 2
 
 

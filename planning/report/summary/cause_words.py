@@ -5,10 +5,14 @@ import math
 from planning.model.words import area_words, percent
 from planning.scene.limits.pair_limits import MEASURED_LIMITS
 from planning.scene.limits.projector_limits import PROJECTOR_LIMITS
+from planning.scene.limits.view_pair_limits import VIEW_PAIR_LIMITS
 
 # Causes that take less than this share of what is left aren't told.
 _LEAST_SHARE = 0.01
-_CAUSE_WORDS = {limit.name: limit.words for limit in PROJECTOR_LIMITS + MEASURED_LIMITS}
+_CAUSE_WORDS = {
+    limit.name: limit.words
+    for limit in (*PROJECTOR_LIMITS, *MEASURED_LIMITS, *VIEW_PAIR_LIMITS)
+}
 
 
 def causes_line(areas: dict[str, float], whole: float, *, most: int = 3) -> str:

@@ -24,6 +24,14 @@ AREA_ROWS = {
 }
 
 
+def area_rows(plan: RigPlan) -> dict[str, str]:
+    """Return which areas are told of a plan: those of light where there is any."""
+    if not plan.cameras_alone:
+        return AREA_ROWS
+    of_light = ("reachable_by_projectors_m2", "lit_m2")
+    return {label: key for label, key in AREA_ROWS.items() if key not in of_light}
+
+
 def coverage_lines(plan: RigPlan) -> list[str]:
     """Return the table of areas, both shares, and what is left uncovered."""
     coverage, document = plan.coverage, plan.document
@@ -36,12 +44,13 @@ def coverage_lines(plan: RigPlan) -> list[str]:
     lit = _ratio(target.lit_m2, target.reachable_by_projectors_m2)
     measured = _ratio(target.measured_m2, target.reachable_by_cameras_m2)
     table = [f"{'':<25}{''.join(f'{title:>24}' for title in columns)}"]
-    for label, key in AREA_ROWS.items():
+    for label, key in area_rows(plan).items():
         cells = (area_cell(getattr(a, key), a.area_m2) for a in columns.values())
         table.append(f"{label:<25}{''.join(f'{cell:>24}' for cell in cells)}")
+    of_light = "" if plan.cameras_alone else f"lit / reachable by projectors {lit}, "
     lines = [
-        f"lit / reachable by projectors {lit}, measured / reachable by "
-        f"cameras {measured}, on the target, {coverage.samples} fresh samples",
+        f"{of_light}measured / reachable by cameras {measured}, on the target, "
+        f"{coverage.samples} fresh samples",
     ]
     lines += _sigma_lines(plan)
     if causes := coverage.uncovered_by_cause:
@@ -73,7 +82,8 @@ def _sigma_lines(plan: RigPlan) -> list[str]:
     light = "" if limits.light is None else ", that of the light"
     panel = "" if limits.drawn_edges is None else " and the panel's pixels"
     edges = (
-        f"predicted sigma along the normal, of {limits.noise_px:g} px edge noise"
+        f"predicted sigma along the normal, of {limits.noise_px:g} px "
+        f"{'noise of matches' if plan.cameras_alone else 'edge noise'}"
         f"{light}{panel} alone"
     )
     if limits.calibration is None:
@@ -211,6 +221,8 @@ def marginal_lines(plan: RigPlan) -> list[str]:
             len(plan.cameras),
         ),
     ):
+        if not areas:
+            continue
         cells = [
             f"{n}{'*' * (n == planned)}: {percent(area / whole)}"
             for n, area in areas.items()

@@ -13,9 +13,21 @@ from geometry.shapes.boxes import box_gap
 from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.words import count_words
 from planning.scene.placed_bodies import bodies_of
 
+from .station_lines import device_counts
+
 _AXES = "xyz"
+
+
+def devices_words(plan: RigPlan, between: str = " and ") -> str:
+    """Return how many devices of each kind a plan has; no projectors aren't told."""
+    n_projectors, n_cameras = device_counts(plan)
+    cameras = count_words(n_cameras, "camera")
+    if plan.cameras_alone:
+        return cameras
+    return f"{count_words(n_projectors, 'projector')}{between}{cameras}"
 
 
 def device_lines(plan: RigPlan) -> list[str]:

@@ -31,6 +31,15 @@ def proof_lines(plan: RigPlan) -> list[str]:
             "nothing is proved of their number",
             f"         {_regions(plan)}",
         ]
+    if proofs.projectors is None:
+        views = requirements.min_views
+        return [
+            "",
+            _proof(plan, "camera", requirements.coverage, "measure by pairs")
+            + f" ({views} or more cameras to a sample)",
+            _continuous(proofs.cameras, "position, aim and roll"),
+            f"         {_regions(plan)}",
+        ]
     if fewest := fewest_words(plan):
         return ["", *labelled("FEWEST", [fewest]), f"         {_regions(plan)}"]
     poses = light_of(plan.projectors[0].device).bounded_over
@@ -75,6 +84,19 @@ def user_selection(plan: RigPlan) -> SelectionRecord | None:
     """Return `surface.selection` if the user made it; older plans have none."""
     selection = plan.document.surface.selection
     return None if selection is None or selection.kind == "curvature" else selection
+
+
+def target_words(plan: RigPlan) -> str:
+    """Return what is to be measured, and how all of it is asked for."""
+    coverage = plan.coverage
+    share = percent(coverage.target.area_m2 / coverage.surface.area_m2, decimals=0)
+    if user_selection(plan) is not None:
+        return f"the {share} of the surface that you chose"
+    if plan.requirements.target == "surface":
+        return "the whole surface"
+    if coverage.target.area_m2 > 0.995 * coverage.surface.area_m2:
+        return "the whole surface, as it is curved alike all over"
+    return f"{share} of highest curvature (--target surface: all)"
 
 
 def _regions(plan: RigPlan) -> str:

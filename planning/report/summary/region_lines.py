@@ -37,14 +37,14 @@ def region_lines(plan: RigPlan) -> list[str]:
     asked = plan.requirements.region_coverage
     met = n - sum(areas.floor == "missed" for _, areas in _large(plan))
     floor = (
-        f"{met} of {n} meet the floor, {percent(asked)} of what can be lit and of what "
-        f"can be measured"
+        f"{met} of {n} meet the floor, {percent(asked)} of what can be "
+        f"{'' if plan.cameras_alone else 'lit and of what can be '}measured"
         if asked
         else f"{count_words(n, 'region')} of at least "
         f"{percent(plan.requirements.region_share)} of the target, no floor"
     )
     region, areas = min(_large(plan), key=lambda pair: min(_shares(pair[1])))
-    worst = f"worst: {region_words(plan, region)}, {_deed(areas)}"
+    worst = f"worst: {region_words(plan, region)}, {_deed(plan, areas)}"
     return labelled("REGIONS", [floor, worst, *_small_lines(plan)])
 
 
@@ -56,7 +56,7 @@ def worst_region(plan: RigPlan) -> str | None:
     region, areas = min(large, key=lambda pair: min(_shares(pair[1])))
     where = ",".join(region_place(plan, region).split(",")[:3])
     area = area_words(region.area_m2)
-    return f"region {region.id} ({area}{where}) {_deed(areas)}"
+    return f"region {region.id} ({area}{where}) {_deed(plan, areas)}"
 
 
 def _small_lines(plan: RigPlan) -> Iterator[str]:
@@ -77,7 +77,7 @@ def _small_lines(plan: RigPlan) -> Iterator[str]:
         f"{len(below)} of {count_words(len(small), 'region')} under "
         f"{percent(required.region_share)} of the target, for which there is no "
         f"floor, would miss it; the largest: {region_words(plan, region)}, "
-        f"{_deed(areas)}{''.join(f'; {change}' for change in areas.relaxations)}"
+        f"{_deed(plan, areas)}{''.join(f'; {change}' for change in areas.relaxations)}"
     )
 
 
@@ -106,11 +106,13 @@ def region_table(plan: RigPlan) -> list[str]:
             if areas.lit_m2
             else "-"
         )
+        shone = "-" if plan.cameras_alone else percent(lit)
+        reach = "-" if plan.cameras_alone else reach
         done = percent(measured) if areas.reachable_by_cameras_m2 else "-"
         floor = areas.floor or ("none" if region.id in large else "small")
         by = " ".join((*region.lit_by, *areas.measured_by)) or "none"
         lines.append(
-            f"{head}{reach:>9} {percent(lit):>7}  {able:>10}  {done:>8}  "
+            f"{head}{reach:>9} {shone:>7}  {able:>10}  {done:>8}  "
             f"{floor:<7} {by:<23}{region_place(plan, region).replace(',', '', 1)}"
         )
     return lines
@@ -132,9 +134,10 @@ def floor_shortfalls(plan: RigPlan) -> Iterator[tuple[str, str, tuple[str, ...]]
             if (cause in of_light) == unlit or cause == "blocked_by_obstacle"
         }
         yield (
-            f"region {region.id} {_deed(areas)}, {100 * asked:g} % asked",
-            f"{region_words(plan, region)} is {_deed(areas)}, {percent(asked)} is "
-            f"required of each region (--region-coverage). Of it: {areas_line(why)}.",
+            f"region {region.id} {_deed(plan, areas)}, {100 * asked:g} % asked",
+            f"{region_words(plan, region)} is {_deed(plan, areas)}, {percent(asked)} "
+            f"is required of each region (--region-coverage). Of it: "
+            f"{areas_line(why)}.",
             (*_remedies(plan, areas, kind), _accepting(accepted)),
         )
 
@@ -178,8 +181,12 @@ def _shares(areas: RegionCoverage) -> tuple[float, float]:
     return lit, measured
 
 
-def _deed(areas: RegionCoverage) -> str:
+def _deed(plan: RigPlan, areas: RegionCoverage) -> str:
     lit, measured = _shares(areas)
+    if plan.cameras_alone:
+        if not areas.reachable_by_cameras_m2:
+            return "out of reach of every pair of cameras"
+        return f"measured {percent(measured)} of what can be"
     if not areas.reachable_by_projectors_m2:
         return "out of reach of every projector"
     if not areas.reachable_by_cameras_m2:

@@ -18,6 +18,7 @@ from planning.report.tolerance.survival_lines import (
 from planning.scene.limits.limit import causes
 from planning.scene.limits.pair_limits import MEASURED_LIMITS
 from planning.scene.limits.projector_limits import PROJECTOR_LIMITS
+from planning.scene.limits.view_pair_limits import VIEW_PAIR_LIMITS
 
 from .cause_words import areas_line, causes_line, rounded_down
 from .device_lines import used_up
@@ -151,7 +152,7 @@ def _reachable(
         ),
         (
             "camera",
-            "what is lit",
+            "the target" if requirements.pattern == "none" else "what is lit",
             "measured",
             areas.reachable_by_cameras_m2,
             areas.lit_m2,
@@ -217,7 +218,7 @@ def _covered(document: PlanDocument, requirements: Requirements) -> Iterator[Sho
         ),
     ):
         share = covered / whole if whole > 0 else 0.0
-        if share >= required:
+        if proof is None or share >= required:
             continue
         devices = kind if proof.count > 1 else kind.removesuffix("s")
         verb = deed if proof.count > 1 else deed.replace(" ", "s ", 1)
@@ -233,7 +234,9 @@ def _covered(document: PlanDocument, requirements: Requirements) -> Iterator[Sho
 
 def _why(kind: str, coverage: Coverage) -> str:
     """What keeps devices of a kind from the target, with areas, as a sentence."""
-    limits = PROJECTOR_LIMITS if kind == "projectors" else MEASURED_LIMITS
+    limits = PROJECTOR_LIMITS
+    if kind == "cameras":
+        limits = (*MEASURED_LIMITS, *VIEW_PAIR_LIMITS)
     areas = {
         cause: area
         for cause, area in coverage.uncovered_by_cause.items()

@@ -9,14 +9,14 @@ from geometry.mesh.mesh import TriangleMesh
 from planning.model.document.input_records import MeshRecord
 from planning.model.plan import RigPlan
 from planning.model.requirements import Workspace
-from planning.model.words import count_words, labelled, percent
+from planning.model.words import labelled, percent
 from planning.report.tolerance.joint_lines import joint_lines
 from planning.report.tolerance.robust_lines import robust_lines
 from planning.report.tolerance.survival_lines import survival_lines
 
 from .check_lines import check_lines, cost_lines, unchecked
 from .coverage_lines import coverage_lines, marginal_lines
-from .device_lines import axis_name, device_lines, mount_lines
+from .device_lines import axis_name, device_lines, devices_words, mount_lines
 from .light_lines import light_lines
 from .proof_lines import proof_lines
 from .ring_lines import code_lines, range_lines, ring_lines
@@ -72,17 +72,21 @@ def _head(plan: RigPlan) -> str:
     bodies = f"         {words}\n" if words else ""
     return (
         f"{'AS BUILT' if evaluation else 'PLAN':<9}"
-        f"{count_words(len(plan.projectors), 'projector')}, "
-        f"{count_words(len(plan.cameras), 'camera')}"
+        f"{devices_words(plan, ', ')}"
         f"{f' of {evaluation.path}' if evaluation else ''} for "
         f"{mesh.path}{cut}\n"
         f"         {size[0]:.0f} x {size[1]:.0f} x {size[2]:.0f} mm, "
         f"{_unit(mesh)}, up {axis_name(workspace.up)}; rig {document.rig.name}, "
-        f"{document.rig.light} light\n"
+        f"{'cameras alone' if plan.cameras_alone else f'{document.rig.light} light'}\n"
+        f"{''.join(_assumed(document.assumed))}"
         f"{shell_line(mesh)}"
         f"{bodies}"
         f"         devices may stand in {_where(workspace)}"
     )
+
+
+def _assumed(sentences: Sequence[str]) -> list[str]:
+    return [f"         assumed: {words}\n" for words in sentences]
 
 
 def lost_in_field(plan: RigPlan) -> str:

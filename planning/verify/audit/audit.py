@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from geometry.parallel import n_threads
-from planning.model.errors import PlanFileError
 from planning.model.plan import RigPlan
 from planning.verify.audit.baselines.baseline_claims import audit_baselines
 from planning.verify.audit.baselines.range_claims import audit_ranges
@@ -35,6 +34,7 @@ from planning.verify.audit.coverage.survival_claims import (
     audit_survival,
     unmet_after_losses,
 )
+from planning.verify.audit.coverage.view_sigma_claims import audit_view_sigma
 from planning.verify.audit.devices.body_claims import audit_bodies, audit_clearance
 from planning.verify.audit.devices.code_claims import audit_codes
 from planning.verify.audit.devices.device_claims import audit_devices, audit_existing
@@ -43,6 +43,7 @@ from planning.verify.audit.devices.exposure_claims import audit_exposures
 from planning.verify.audit.devices.mount_claims import audit_mounts
 from planning.verify.audit.devices.obstacle_claims import audit_obstacles
 from planning.verify.audit.devices.stock_claims import audit_stock
+from planning.verify.audit.devices.view_claims import audit_views
 from planning.verify.audit.devices.workspace_claims import audit_workspace
 from planning.verify.audit.devices.zone_claims import audit_zones
 from planning.verify.audit.rings.axis_claims import audit_ring_axes
@@ -89,6 +90,33 @@ _CLAIMS = (
     audit_cost,
 )
 
+# Cameras alone: what is said of light and its patterns isn't there.
+_CLAIMS_OF_VIEWS = (
+    audit_views,
+    audit_devices,
+    audit_workspace,
+    audit_zones,
+    audit_existing,
+    audit_bodies,
+    audit_clearance,
+    audit_mounts,
+    audit_stock,
+    audit_obstacles,
+    audit_areas,
+    audit_inside,
+    audit_view_sigma,
+    audit_regions,
+    audit_floors,
+    audit_tables,
+    audit_shares,
+    audit_certificates,
+    audit_baselines,
+    audit_groups,
+    audit_limits,
+    audit_scales,
+    audit_cost,
+)
+
 
 @dataclass(frozen=True, eq=False)
 class Audit:
@@ -122,14 +150,11 @@ def audit_plan(
     Raises:
         PlanFileError: If the plan is broken, so that its claims have no meaning.
     """
-    if plan.requirements.pattern == "none":
-        raise PlanFileError(
-            "requirements.pattern is 'none'; only 'rings' and 'dense' can be audited"
-        )
     threads = threads or n_threads()
     case = examine(plan, seed=seed, n_samples=n_samples, threads=threads)
     findings = AuditFindings()
-    for audit_claims in _CLAIMS:
+    alone = plan.requirements.pattern == "none"
+    for audit_claims in _CLAIMS_OF_VIEWS if alone else _CLAIMS:
         audit_claims(case, findings)
     return Audit(findings.failures, _unmet_requirements(plan), case)
 

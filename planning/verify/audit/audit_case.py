@@ -1,5 +1,6 @@
 """What every part of the audit looks at: the plan, and what was recomputed of it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -17,13 +18,9 @@ from planning.verify.audit.predicates.audit_devices import (
     audit_cameras,
     audit_projectors,
 )
+from planning.verify.audit.predicates.examined import what_any_could, what_devices_do
 from planning.verify.audit.predicates.occlusion import Shadow
-from planning.verify.audit.predicates.recompute import (
-    Reachable,
-    Recomputed,
-    reachable_by,
-    recompute,
-)
+from planning.verify.audit.predicates.recompute import Reachable, Recomputed
 
 from .audit_samples import AuditSamples, draw_samples
 from .estimates import Estimator
@@ -40,6 +37,7 @@ class DeviceKind:
         proof: Their certificate.
         most: How many are allowed; None: as many as it takes.
         covers: Whether each lights or measures each sample, shape (n_d, n).
+        covered_with: Return what some of them light or measure, shape (n,).
         coverable: Whether anything could, shape (n,).
         reachable_m2: Claimed area of the target that they could cover.
         share: Of it that must be covered.
@@ -54,6 +52,7 @@ class DeviceKind:
     proof: Certificate
     most: int | None
     covers: Mask
+    covered_with: Callable[[list[int]], Mask]
     coverable: Mask
     reachable_m2: float
     share: float
@@ -113,15 +112,34 @@ class AuditCase:
         }
 
     @cached_property
-    def kinds(self) -> tuple[DeviceKind, DeviceKind]:
-        """What the plan says of its projectors, then of its cameras."""
-        limits = self.plan.requirements
-        return (
-            self._kind("projector", self.actual.lit_by, limits.dominant_coverage),
-            self._kind("camera", self.actual.measured_by, limits.coverage),
-        )
+    def kinds(self) -> tuple[DeviceKind, ...]:
+        """What the plan says of its projectors, then of its cameras.
 
-    def _kind(self, name: str, covers: Mask, share: float) -> DeviceKind:
+        Of cameras alone there is but one kind.
+        """
+        limits, lit_by = self.plan.requirements, self.actual.lit_by
+        cameras = self._kind(
+            "camera",
+            self.actual.measured_by,
+            limits.coverage,
+            self.actual.measured_with,
+        )
+        if limits.pattern == "none":
+            return (cameras,)
+
+        def lit_with(projectors: list[int]) -> Mask:
+            return np.any(lit_by[projectors], axis=0)
+
+        share = limits.dominant_coverage
+        return self._kind("projector", lit_by, share, lit_with), cameras
+
+    def _kind(
+        self,
+        name: str,
+        covers: Mask,
+        share: float,
+        covered_with: Callable[[list[int]], Mask],
+    ) -> DeviceKind:
         plan, document, limits = self.plan, self.plan.document, self.plan.requirements
         return DeviceKind(
             name=name,
@@ -131,6 +149,7 @@ class AuditCase:
             proof=getattr(document.certificates, f"{name}s"),
             most=getattr(limits, f"max_{name}s"),
             covers=covers,
+            covered_with=covered_with,
             coverable=getattr(self.reachable, f"{name}s"),
             reachable_m2=getattr(plan.coverage.target, f"reachable_by_{name}s_m2"),
             share=share,
@@ -144,11 +163,11 @@ def examine(plan: RigPlan, *, seed: int, n_samples: int, threads: int) -> AuditC
     """Recompute what a plan's devices and reference poses do to fresh samples."""
     samples = draw_samples(plan.surface, plan.requirements.target, n_samples, seed)
     shadow = Shadow.of(plan, threads=threads)
-    actual = recompute(plan, samples, shadow)
+    actual = what_devices_do(plan, samples, shadow)
     areas = plan.surface.mesh.face_areas
     target_m2 = areas[plan.surface.target_faces(plan.requirements.target)].sum()
     estimator = Estimator(
         samples, plan.coverage.samples, float(areas.sum()), float(target_m2)
     )
-    reachable = reachable_by(plan, actual, shadow, seed)
+    reachable = what_any_could(plan, actual, shadow, seed)
     return AuditCase(plan, shadow, actual, reachable, estimator, seed)

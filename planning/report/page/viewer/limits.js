@@ -127,10 +127,12 @@ export function whyNoPair(cause, value, limits) {
   const plain = (x) => x.toPrecision(3);
   switch (cause) {
     case "sigma":
+    case "view_sigma":
       return `off by ${against(value, limit, (x) => mm(x, 3), true)}; --accuracy ${(1e3 * Math.max(value, limit) * 1.005).toPrecision(3)} would do`;
     case "conditioning":
       return `|r.m| ${against(value, limit, plain, false)}, on a blind curve; limits.min_conditioning = ${(Math.floor(100 * Math.min(value, limit)) / 100).toFixed(2)} would do`;
-    case "angle": {
+    case "angle":
+    case "view_angle": {
       const [low, high] = limit;
       const small = value < low;
       const asks = (180 / Math.PI) * (small ? Math.min(value, low) : Math.max(value, high));

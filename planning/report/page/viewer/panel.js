@@ -11,6 +11,9 @@ export class Panel {
     Object.assign(this, { facts, arrays, surface, layers });
     this.projectors = facts.devices.filter((d) => d.kind === "projector");
     this.cameras = facts.devices.filter((d) => d.kind === "camera");
+    // Cameras alone measure by each other: the first of a pair stands for its light.
+    this.alone = !this.projectors.length;
+    this.lights = this.alone ? this.cameras : this.projectors;
   }
 
   // Limits passed by a device on a face, and how many there are.
@@ -72,7 +75,7 @@ export class Panel {
     const count = this.layers.codes("pairs")[face];
     const best = this.arrays.get("best")[0][face];
     const [p, c] = [Math.floor(best / this.cameras.length), best % this.cameras.length];
-    const pair = `${this.projectors[p].id} + ${this.cameras[c].id}`;
+    const pair = `${this.lights[p].id} + ${this.cameras[c].id}`;
     const sigma = this.layers.words("sigma", face);
     const terms = this.facts.layers.filter((l) => l.id.startsWith("sigma."));
     const parts = terms.map((l) => `${l.id.slice(6)} ${this.layers.words(l.id, face)}`);
@@ -96,8 +99,9 @@ export class Panel {
   pairs(face) {
     const rows = [];
     const causes = this.facts.causes.pair;
-    this.projectors.forEach((projector, p) =>
+    this.lights.forEach((projector, p) =>
       this.cameras.forEach((camera, c) => {
+        if (this.alone && p >= c) return;
         if (!this.steps(projector, face).good || !this.steps(camera, face).good) return;
         const pair = p * this.cameras.length + c;
         const passed = this.arrays.get("pairs")[pair][face];

@@ -21,7 +21,7 @@ export class Sequence {
 
   go(step) {
     const { length } = this.facts.sequence;
-    this.step = step < 0 ? -1 : step % length;
+    this.step = step < 0 || !length ? -1 : step % length;
     if (this.step < 0) {
       byId("step-words").textContent = `${length} step${length === 1 ? "" : "s"}; not stepping`;
       return;

@@ -294,13 +294,13 @@ def _audit_refuted(
     bound = kind.proof.candidates.lower_bound
     total = kind.proof.candidates.for_total or 0
     enough = kind.proof.required_m2 + slack
-    covers = kind.covers & case.samples.in_target
+    within = case.samples.in_target
     spare = [i for i, device in enumerate(kind.devices) if not device.existing]
     staying = list(range(len(kind.devices)))
     while len(staying) >= bound and spare:
         areas = [
             case.estimator.area(
-                np.any(covers[[i for i in staying if i != out]], axis=0)
+                kind.covered_with([i for i in staying if i != out]) & within
             )
             for out in spare
         ]
@@ -308,7 +308,7 @@ def _audit_refuted(
         staying.remove(spare.pop(best))
         if not areas[best] > enough:
             return
-        floors = _meets_floors(kind, np.any(covers[staying], axis=0), case)
+        floors = _meets_floors(kind, kind.covered_with(staying) & within, case)
         for name, least in (("for_total", total), ("lower_bound", bound)):
             if len(staying) < least and (floors or name == "for_total"):
                 findings.fail(

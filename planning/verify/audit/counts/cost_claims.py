@@ -50,6 +50,9 @@ def _frames(plan: RigPlan, n_cameras: int, *, left_out: bool = False) -> int:
     Perhaps with the rings that were left out. Of a dense code a bit for each halving
     of the panel's width and height down to half a period, or to a pixel; and sinusoids.
     """
+    if not plan.document.projectors:
+        # All cameras see the object as it is, once.
+        return 1
     coded = 0
     for projector in plan.document.projectors:
         if (code := projector.code) is not None:
@@ -71,6 +74,9 @@ def _frame_time(plan: RigPlan) -> float | None:
     cameras = rig.figures_of("camera", (one.model for one in plan.cameras))
     lamps = rig.figures_of("projector", (one.model for one in plan.projectors))
     rate = min(figures.frame_rate_hz or 0.0 for figures in cameras)
+    if not plan.document.projectors:
+        exposed = 1e-3 * max(figures.exposure_ms or 0 for figures in cameras)
+        return max(1.0 / rate, exposed) if rate > 0.0 else None
     refresh = min(figures.frame_rate_hz or 0.0 for figures in lamps)
     if not (rate > 0.0 and refresh > 0.0):
         return None

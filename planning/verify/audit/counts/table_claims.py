@@ -114,17 +114,21 @@ _OF_PIXELS = (
     ("max_angle_deg", "triangulation", "max_angle", _DEGREE),
 )
 # Where a rig states none, docs/reference/rig-files.md.
-_ANGLES = {"min_angle_deg": 10.0, "max_angle_deg": 90.0}
+_ANGLES = {
+    "dense": {"min_angle_deg": 10.0, "max_angle_deg": 90.0},
+    "none": {"min_angle_deg": 10.0, "max_angle_deg": 60.0},
+}
 
 
 def audit_limits(case: AuditCase, findings: AuditFindings) -> None:
     """The rig's limits are those of the requirements."""
     limits = case.plan.document.rig.limits
-    own = _OF_RINGS if case.plan.requirements.pattern == "rings" else _OF_PIXELS
+    pattern = case.plan.requirements.pattern
+    own = _OF_RINGS if pattern == "rings" else _OF_PIXELS
     for name, part, wish, unit in _LIMITS + own:
         stated, whose = limits.get(name), f"rig.limits.{name}"
         if stated is None:
-            stated = _ANGLES.get(name)
+            stated = _ANGLES.get(pattern, {}).get(name)
         truth = None if stated is None else unit * stated
         required = getattr(getattr(case.plan.requirements, part), wish)
         key = f"requirements.{part}.{wish}"

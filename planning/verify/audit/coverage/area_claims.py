@@ -24,9 +24,10 @@ from planning.verify.audit.predicates.predicates import (
     light_steps,
 )
 from planning.verify.audit.predicates.reference_devices import reference_projectors
+from planning.verify.audit.predicates.view_pairs import VIEW_CAUSES
 
 _Device = PlannedProjector | PlannedCamera | AuditProjector
-_CAUSES = LIGHT_CAUSES + SIGHT_CAUSES + PAIR_CAUSES
+_CAUSES = LIGHT_CAUSES + SIGHT_CAUSES + PAIR_CAUSES + VIEW_CAUSES
 
 
 def recomputed_areas(case: AuditCase) -> dict[str, dict[str, float]]:
@@ -117,10 +118,11 @@ def _audit_contributions(case: AuditCase, findings: AuditFindings) -> None:
     audit, document, actual = case.estimator.audit, case.plan.document, case.actual
     for projector, lit in zip(document.projectors, actual.lit_by, strict=True):
         audit(f"{projector.id}.lit_area_m2", projector.lit_area_m2, lit, findings)
-    alone = actual.measured_by.sum(axis=0) == 1
-    for camera, seen in zip(document.cameras, actual.measured_by, strict=True):
+    for camera, seen, alone in zip(
+        document.cameras, actual.measured_by, actual.alone, strict=True
+    ):
         audit(f"{camera.id}.seen_area_m2", camera.seen_area_m2, seen, findings)
-        audit(f"{camera.id}.sole_area_m2", camera.sole_area_m2, seen & alone, findings)
+        audit(f"{camera.id}.sole_area_m2", camera.sole_area_m2, alone, findings)
 
 
 def _audit_blocked(case: AuditCase, findings: AuditFindings) -> None:
@@ -136,7 +138,7 @@ def _audit_blocked(case: AuditCase, findings: AuditFindings) -> None:
     blocks = {d.id: block for d in devices if (block := block_of(d)) is not None}
     hindrances = {solid.name: solid for solid in case.shadow.hindrances}
     dark = actual.samples.in_target & ~actual.measured
-    seen_lit = actual.pairs.max(axis=0, initial=-1)
+    seen_lit = actual.steps_of_cameras
     light = np.isin(actual.light, (PROJECTOR_BODY, LIGHT_OBSTACLE))
     sight = np.isin(seen_lit, (CAMERA_BODY, SIGHT_OBSTACLE))
     stopped = [*(dark & light), *(dark & actual.lit & sight)]

@@ -17,23 +17,20 @@ from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.audit_samples import AuditSamples, draw_region
 from planning.verify.audit.estimates import POINT, ROUNDING, pooled_error
+from planning.verify.audit.predicates.examined import what_any_could, what_devices_do
 from planning.verify.audit.predicates.predicates import (
     LIGHT_CAUSES,
     PAIR_CAUSES,
     SIGHT_CAUSES,
 )
-from planning.verify.audit.predicates.recompute import (
-    Reachable,
-    Recomputed,
-    reachable_by,
-    recompute,
-)
+from planning.verify.audit.predicates.recompute import Reachable, Recomputed
+from planning.verify.audit.predicates.view_pairs import VIEW_CAUSES
 
 # Samples of the audit in a large region, and of the plan, which earns no more tolerance
 # for stating fewer.
 _AT_LEAST, _CLAIMED = 500, 400
 _SLACK = 1e-9
-_CAUSES = LIGHT_CAUSES + SIGHT_CAUSES + PAIR_CAUSES
+_CAUSES = LIGHT_CAUSES + SIGHT_CAUSES + PAIR_CAUSES + VIEW_CAUSES
 
 
 # What becomes of samples, what could, and which region they lie in.
@@ -171,8 +168,8 @@ def region_parts(case: AuditCase) -> _Parts:
         if n > 0
     ]
     if more:
-        actual = recompute(case.plan, AuditSamples.joined(more), case.shadow)
-        reachable = reachable_by(case.plan, actual, case.shadow, case.seed)
+        actual = what_devices_do(case.plan, AuditSamples.joined(more), case.shadow)
+        reachable = what_any_could(case.plan, actual, case.shadow, case.seed)
         parts.append((actual, reachable))
     return parts
 

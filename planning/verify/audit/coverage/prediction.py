@@ -16,6 +16,7 @@ from planning.verify.audit.predicates.audit_devices import (
     audit_projectors,
 )
 from planning.verify.audit.predicates.audit_optics import dot, towards
+from planning.verify.audit.predicates.examined import what_devices_do
 from planning.verify.audit.predicates.occlusion import Shadow
 from planning.verify.audit.predicates.predicates import MEASURED
 from planning.verify.audit.predicates.recompute import Recomputed, recompute
@@ -41,11 +42,13 @@ def predict_measured(
     threads = threads or n_threads()
     drawn = draw_samples(plan.surface, plan.requirements.target, n_samples, seed)
     samples = drawn.take(drawn.in_target)
-    return recompute(plan, samples, Shadow.of(plan, threads=threads))
+    return what_devices_do(plan, samples, Shadow.of(plan, threads=threads))
 
 
 def possible_at_floors(plan: RigPlan, samples: AuditSamples, *, threads: int) -> Mask:
     """Return whether each camera could measure each sample, shape (n_c, n)."""
+    if plan.requirements.pattern == "none":
+        return _seen_at_floors(plan, samples, threads=threads)
     shadow = Shadow.of(plan, threads=threads)
     floors = {"requirements": _at_floors(plan.requirements)}
     relaxed = RigPlan(plan.document.model_copy(update=floors), plan.surface)
@@ -59,6 +62,14 @@ def possible_at_floors(plan: RigPlan, samples: AuditSamples, *, threads: int) ->
             along = receding(projector, camera, samples.take(able))
             possible[c, able[along <= most]] = True
     return possible
+
+
+def _seen_at_floors(plan: RigPlan, samples: AuditSamples, *, threads: int) -> Mask:
+    """Return whether each camera is of a pair that could measure a sample, (n_c, n)."""
+    floors = {"requirements": _at_floors(plan.requirements)}
+    relaxed = RigPlan(plan.document.model_copy(update=floors), plan.surface)
+    shadow = Shadow.of(plan, threads=threads)
+    return what_devices_do(relaxed, samples, shadow).measured_by
 
 
 def receding(

@@ -1,5 +1,6 @@
 """Claims about the predicted standard deviation of what is measured."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -28,12 +29,23 @@ def audit_sigma(case: AuditCase, findings: AuditFindings) -> None:
 
     Of each sample the pair counts that measures it with the least deviation.
     """
+    if "sigma" in case.plan.coverage.model_fields_set:
+        below = findings.at("coverage.sigma")
+        audit_deviations(case, _best_pairs(case), NOISE_TERMS, below)
+
+
+def audit_deviations(
+    case: AuditCase,
+    terms: dict[str, Array],
+    noise: Sequence[str],
+    below: AuditFindings,
+) -> None:
+    """Check the claims by the terms of each measured sample's best pair [m], (n,) each.
+
+    `noise` names those of which the calibration is no part.
+    """
     claims = case.plan.coverage
-    if "sigma" not in claims.model_fields_set:
-        return
-    below = findings.at("coverage.sigma")
-    terms = _best_pairs(case)
-    n = len(terms["edges"])
+    n = len(next(iter(terms.values())))
     if claims.sigma is None or not n:
         either = "null, but the target is measured" if n else "not measured"
         below.holds((claims.sigma is None) == (not n), "", either)
@@ -42,7 +54,7 @@ def audit_sigma(case: AuditCase, findings: AuditFindings) -> None:
     for name, share in _SHARES.items():
         for key, values in (
             (name, deviation(terms)),
-            (f"noise_{name}", deviation(terms, NOISE_TERMS)),
+            (f"noise_{name}", deviation(terms, noise)),
         ):
             if key not in claims.sigma.model_fields_set:
                 continue

@@ -1,5 +1,6 @@
 """What each camera of a plan sees of the object, by the audit's own predicates."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,20 +8,20 @@ import numpy as np
 from geometry.arrays import Array, Ints
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera
-from planning.verify.audit.audit_samples import draw_samples
-from planning.verify.audit.predicates.audit_devices import (
-    AuditProjector,
-    audit_projectors,
-)
+from planning.verify.audit.audit_samples import AuditSamples, draw_samples
+from planning.verify.audit.predicates.audit_devices import audit_projectors
 from planning.verify.audit.predicates.audit_optics import (
     dot,
     in_frame,
     rays_of,
     towards,
 )
+from planning.verify.audit.predicates.examined import what_devices_do
 from planning.verify.audit.predicates.occlusion import Shadow
 from planning.verify.audit.predicates.predicates import MEASURED
-from planning.verify.audit.predicates.recompute import recompute
+from planning.verify.audit.predicates.recompute import Recomputed
+from planning.verify.audit.predicates.recomputed_views import RecomputedViews
+from planning.verify.audit.predicates.view_pairs import GOOD
 
 _N_SAMPLES = 20_000
 # Rays over the longer side of the image that tell how much of it the object fills.
@@ -43,7 +44,8 @@ class CameraFigures:
         filled: Share of its image that the object fills, seen past all obstacles.
         distance_m: Spread of the distance of what it measures.
         sharp_m: Nearest and farthest distance that is sharp.
-        triangulation: Spread of the angle between view and light, by projector.
+        triangulation: Spread of the angle between view and light, by projector; of
+            cameras alone between both views, by the other camera.
     """
 
     id: str
@@ -59,19 +61,14 @@ def camera_figures(plan: RigPlan, *, threads: int) -> tuple[CameraFigures, ...]:
     target, seed = plan.requirements.target, plan.document.seed
     samples = draw_samples(plan.surface, target, _N_SAMPLES, seed)
     shadow = Shadow.of(plan, threads=threads)
-    actual = recompute(plan, samples, shadow)
-    projectors = audit_projectors(plan)
+    actual = what_devices_do(plan, samples, shadow)
     figures: list[CameraFigures] = []
     for c, camera in enumerate(plan.cameras):
         local = in_frame(camera.world_from_device, samples.points)
         mine = local[actual.measured_by[c]]
-        pairs = (np.flatnonzero(pair == MEASURED) for pair in actual.pairs[:, c])
         angles = {
-            planned.id: _spread(_angles(light, camera, samples.points, both))
-            for planned, light, both in zip(
-                plan.projectors, projectors, pairs, strict=True
-            )
-            if planned.station in ("", camera.station)
+            name: _spread(_angles(light, camera, samples.points, both))
+            for name, light, both in _lights(plan, actual, samples, c)
         }
         pixels = mine[:, 2] / camera.device.focal_px
         figures.append(
@@ -87,10 +84,28 @@ def camera_figures(plan: RigPlan, *, threads: int) -> tuple[CameraFigures, ...]:
     return tuple(figures)
 
 
-def _angles(
-    projector: AuditProjector, camera: PlannedCamera, points: Array, chosen: Ints
-) -> Array:
-    light, _ = projector.light.to_points(points[chosen])
+def _lights(
+    plan: RigPlan, actual: Recomputed, samples: AuditSamples, c: int
+) -> Iterator[tuple[str, Array, Ints]]:
+    """Yield id and rays of what a camera measures with, and which samples, (k,).
+
+    Projectors, or the other cameras where there are none.
+    """
+    if isinstance(actual, RecomputedViews):
+        for k, other in enumerate(plan.cameras):
+            rays, _ = towards(samples.points, other.world_from_device[:3, 3])
+            if k != c:
+                yield other.id, rays, np.flatnonzero(actual.met[c, k] == GOOD)
+        return
+    for p, projector in enumerate(audit_projectors(plan)):
+        light, _ = projector.light.to_points(samples.points)
+        measured = np.flatnonzero(actual.pairs[p, c] == MEASURED)
+        if plan.projectors[p].station in ("", plan.cameras[c].station):
+            yield plan.projectors[p].id, light, measured
+
+
+def _angles(light: Array, camera: PlannedCamera, points: Array, chosen: Ints) -> Array:
+    light = light[chosen]
     view, _ = towards(points[chosen], camera.world_from_device[:3, 3])
     return np.arccos(np.clip(dot(light, view), -1.0, 1.0))
 

@@ -66,6 +66,22 @@ class Recomputed:
         """Whether each camera measures each sample with any projector, (n_c, n)."""
         return np.any(self.pairs == MEASURED, axis=0)
 
+    def measured_with(self, cameras: list[int]) -> Mask:
+        """Return what some of the cameras measure without the others, shape (n,)."""
+        return np.any(self.measured_by[cameras], axis=0)
+
+    @cached_property
+    def alone(self) -> Mask:
+        """Whether a sample isn't measured without each camera, shape (n_c, n)."""
+        every = range(len(self.measured_by))
+        rest = [self.measured_with([i for i in every if i != c]) for c in every]
+        return self.measured & ~np.array(rest).reshape(len(every), -1)
+
+    @property
+    def steps_of_cameras(self) -> Steps:
+        """Limits of *seen* and more that cameras pass on what is lit, (n_c, n)."""
+        return self.pairs.max(axis=0, initial=-1)
+
     @cached_property
     def measured(self) -> Mask:
         """Whether any pair of the plan measures each sample, shape (n,)."""

@@ -1,0 +1,1 @@
+"""Cameras alone: what pairs of them measure, the fewest, and what is proved of them."""

@@ -1,0 +1,1 @@
+"""`--pattern none`: cameras alone, from the request to the plan."""

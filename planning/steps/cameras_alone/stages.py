@@ -1,0 +1,119 @@
+"""From a request for cameras alone to its plan."""
+
+from dataclasses import replace
+
+from planning.cameras.camera_cover import camera_candidate_views
+from planning.cameras.photogrammetry.view_bound import bound_views
+from planning.cameras.photogrammetry.view_stage import place_views
+from planning.model.errors import InfeasibleLimitsError
+from planning.model.plan import InterruptedPlanError, RigPlan
+from planning.model.progress import TIME_IS_UP, Stopwatch
+from planning.proofs import camera_bound
+from planning.proofs.candidate_certificate import larger
+from planning.report.advice.standing_inside import standing_inside
+from planning.report.advice.what_helps import falls_short
+from planning.report.partial_plan import PlanRequest
+from planning.report.region_claims import below_floor
+from planning.rig.devices.lens_fit import check_fields
+from planning.steps.prepare import prepared
+
+from .view_document import ViewPlan, write_view_plan
+
+
+def planned_alone(
+    request: PlanRequest, clock: Stopwatch, _keep: object
+) -> tuple[RigPlan, None]:
+    """Return what `plan_alone` does, and no partial plan: rings may not help it."""
+    return plan_alone(request, clock), None
+
+
+def plan_alone(request: PlanRequest, clock: Stopwatch) -> RigPlan:
+    """Return the fewest cameras found whose pairs measure what is required.
+
+    One camera more where fresh samples fall short.
+
+    Raises:
+        InfeasibleLimitsError: If no pair of cameras measures anything.
+        InterruptedPlanError: If planning is interrupted; it carries the best plan.
+        TimeLimitError: If the time limit came before any plan was written.
+    """
+    partial = _first_cameras(request, clock)
+    plan = None
+    try:
+        if clock.limited:
+            plan = write_view_plan(replace(partial, truncated=True), clock)
+        partial = _bounded(partial, clock)
+        while True:
+            plan = write_view_plan(partial, clock)
+            more = _one_camera_more(partial, plan, clock)
+            if more is None:
+                return plan
+            partial = more
+    except KeyboardInterrupt:
+        clock.lift()
+        cut = replace(partial, truncated=True)
+        raise InterruptedPlanError(write_view_plan(cut, clock)) from None
+    except TIME_IS_UP:
+        clock.extend()
+        if plan is None:
+            raise
+        return RigPlan(plan.document.changed(truncated=True), plan.surface)
+
+
+def _first_cameras(request: PlanRequest, clock: Stopwatch) -> ViewPlan:
+    """The fewest of the candidates."""
+    fits = request.rig.fits(request.mesh)
+    check_fields([fit for fit in fits if fit.role == "camera"])
+    ready = prepared(request, clock)
+    with clock.stage("cameras", "cameras: candidates, their pairs and the cover"):
+        count = request.rig.n_camera_poses
+        views = camera_candidate_views(ready.scene, ready.cameras, count)
+        try:
+            stage = place_views(ready.scene, views)
+        except InfeasibleLimitsError as error:
+            helps = standing_inside(ready.scene, views.cameras)
+            raise InfeasibleLimitsError(f"{error}{helps}") from None
+        least = stage.certificate.candidates.lower_bound
+        clock.say(
+            f"  {len(stage.cameras)} of {len(stage.reference)} candidates; at least "
+            f"{least} are needed"
+        )
+    return ViewPlan(ready, stage, stage.cameras)
+
+
+def _bounded(partial: ViewPlan, clock: Stopwatch) -> ViewPlan:
+    """The same with the bound over all poses of the workspace."""
+    request = partial.request
+    with clock.stage("camera_bounds", "bounds over all poses of the cameras"):
+        effort = camera_bound.PROVE if request.prove else camera_bound.DEFAULT
+        optics = request.rig.optics[1]
+        stage = bound_views(partial.scene, partial.stage, optics, effort)
+        bound = stage.certificate.continuous
+        if bound is not None:
+            clock.say(f"  cameras: at least {bound.lower_bound}, {bound.proof}")
+    return replace(partial, stage=stage)
+
+
+def _one_camera_more(
+    partial: ViewPlan, plan: RigPlan, clock: Stopwatch
+) -> ViewPlan | None:
+    """One camera more where fresh samples don't confirm a cover that met its own.
+
+    The proved bound stays what it is; the count is then above it, and says so.
+    """
+    required, areas = plan.requirements, plan.coverage.target
+    short = falls_short(
+        areas.measured_m2, areas.reachable_by_cameras_m2, required.coverage
+    ) or any(
+        below_floor(region.coverage, required.region_coverage)[1]
+        for region in plan.document.regions
+        if region.coverage is not None and region.coverage.floor == "missed"
+    )
+    if not short:
+        return None
+    stage = larger(partial.stage, partial.cameras, required.max_cameras)
+    if stage is None:
+        return None
+    clock.say("  fresh samples fall short: one camera more")
+    cameras = stage.by_count[stage.certificate.count]
+    return replace(partial, stage=replace(stage, cameras=cameras), cameras=cameras)

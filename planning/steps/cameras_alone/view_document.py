@@ -1,0 +1,216 @@
+"""Turns cameras alone into a plan: poses rounded, every claim recomputed from them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.cameras.baselines.baseline_rows import baseline_rows
+from planning.cameras.baselines.seams import SampledSurface, overlap_components
+from planning.cameras.photogrammetry.best_pairs import widest_sample
+from planning.cameras.photogrammetry.measured_views import measured_views
+from planning.cameras.photogrammetry.view_stage import ViewStage
+from planning.model.bodies import Obstacle
+from planning.model.document.certificates import Certificates
+from planning.model.document.coverage_records import CameraMarginal
+from planning.model.document.input_records import RigRecord, SurfaceRecord, Units
+from planning.model.document.plan_document import (
+    FORMAT,
+    VERSION,
+    MemberRecord,
+    PlanDocument,
+)
+from planning.model.plan import RigPlan
+from planning.model.planned import PlannedCamera
+from planning.model.progress import Stopwatch
+from planning.model.requirements import Requirements
+from planning.model.surface import Surface
+from planning.report.claims import Claims
+from planning.report.entries import device_entries as entries
+from planning.report.entries.cost_entry import cost_record
+from planning.report.judged import Devices
+from planning.report.partial_plan import PlanRequest, Prepared
+from planning.scene.draws import DRAWS
+from planning.scene.scene import Scene
+
+from .view_claims import view_claims
+
+# What cameras alone measure by.
+ASSUMED = (
+    "texture on all of the surface, as fine as the cameras resolve",
+    "even light of the room, under which no texture moves",
+)
+# A point must be found within so many pixels of the cameras, where those are largest.
+_TAU_PIXELS = 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class ViewPlan:
+    """Cameras alone in the making: what was ordered, and how far it came."""
+
+    ready: Prepared
+    stage: ViewStage
+    cameras: tuple[PlannedCamera, ...]
+    truncated: bool = False
+
+    @property
+    def request(self) -> PlanRequest:
+        """What is asked."""
+        return self.ready.request
+
+    @property
+    def scene(self) -> Scene:
+        """Surface, target and requirements."""
+        return self.ready.scene
+
+
+def write_view_plan(partial: ViewPlan, clock: Stopwatch) -> RigPlan:
+    """Round the poses, recompute every claim from them, and write the document."""
+    scene, devices = partial.scene, _rounded_devices(partial)
+    with clock.stage("claims", "coverage, recomputed from the rounded poses"):
+        claims = view_claims(scene, devices)
+        marginal = _marginal(partial, claims)
+    surface = _surface(scene, devices)
+    rig = RigRecord(**partial.request.rig.to_document())
+    cameras = entries.camera_records(scene, devices.cameras, claims)
+    regions = entries.region_records(scene.mesh, partial.ready.regions, claims)
+    certificates = _certificates(partial)
+    samples = claims.target_samples.samples
+    document = PlanDocument(
+        format=FORMAT,
+        version=VERSION,
+        units=Units(length="m", angle="rad"),
+        seed=partial.request.seed,
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+        command=partial.request.command,
+        truncated=partial.truncated,
+        meshes=(entries.mesh_record(scene.mesh, scene.shell),),
+        surface=_surface_record(partial, surface),
+        rig=rig,
+        requirements=_final_requirements(scene, claims, devices),
+        regions=regions,
+        projectors=(),
+        cameras=cameras,
+        coverage=claims.coverage,
+        marginal=marginal,
+        certificates=certificates,
+        baselines=tuple(
+            baseline_rows(
+                devices.cameras,
+                SampledSurface(samples.points, samples.normals),
+                claims.measured_by,
+                scene.requirements.camera.max_incidence,
+            )
+        ),
+        camera_groups=tuple(
+            tuple(devices.cameras[c].id for c in group)
+            for group in overlap_components(claims.measured_by)
+        ),
+        cost=cost_record(
+            rig,
+            (),
+            cameras,
+            n_before=certificates.cameras.greedy_count,
+            stages=clock.processor,
+        ),
+        members=(
+            MemberRecord(
+                mesh=0,
+                coverage=claims.coverage,
+                regions=tuple(region.id for region in regions),
+                reconstruction=None,
+            ),
+        ),
+        assumed=ASSUMED,
+        reconstruction=None,
+        timings_s=dict(clock.seconds),
+    )
+    return RigPlan(document, surface)
+
+
+def _rounded_devices(partial: ViewPlan) -> Devices:
+    """The cameras and the reference set as they will be written."""
+    names = entries.device_ids(partial.cameras, "C")
+    cameras = zip(partial.cameras, names, strict=True)
+    return Devices(
+        (),
+        tuple(entries.rounded_camera(camera, name) for camera, name in cameras),
+        (),
+        tuple(entries.rounded_camera(c, "") for c in partial.stage.reference),
+    )
+
+
+def _surface(scene: Scene, devices: Devices) -> Surface:
+    none: NDArray[np.float64] = np.zeros((0, 4, 4))
+    return Surface(
+        scene.mesh,
+        np.zeros(len(scene.mesh.faces), dtype=np.int64),
+        scene.region,
+        scene.steep,
+        none,
+        none,
+        np.stack([c.world_from_device for c in devices.reference_cameras]),
+        tuple(Obstacle(solid.name, solid.mesh) for solid in scene.obstructions),
+    )
+
+
+def _surface_record(partial: ViewPlan, surface: Surface) -> SurfaceRecord:
+    return SurfaceRecord(
+        path="surface.npz",
+        sha256=surface.sha256(),
+        curvature_radius_m=partial.ready.curvature_radius_m,
+        dominant_share=partial.ready.regions.dominant_share,
+        selection=entries.selection_record(
+            partial.scene.mesh, partial.scene.region, partial.request.interest
+        ),
+    )
+
+
+def _final_requirements(scene: Scene, claims: Claims, devices: Devices) -> Requirements:
+    """State tau and the reference set as they are."""
+    required = scene.requirements
+    workspace = replace(
+        required.workspace,
+        n_reference_projectors=0,
+        n_reference_cameras=len(devices.reference_cameras),
+    )
+    widest = widest_sample(scene, devices.cameras, claims.target_samples)
+    check = replace(required.check, tau_m=round(_TAU_PIXELS * widest, 6))
+    return replace(required, workspace=workspace, check=check)
+
+
+def _certificates(partial: ViewPlan) -> Certificates:
+    cameras, scene = partial.stage.certificate, partial.scene
+    if scene.requirements.region_coverage:
+        cameras = cameras.changed(floors=len(scene.large_regions))
+    return Certificates(cameras=cameras)
+
+
+def _marginal(partial: ViewPlan, claims: Claims) -> tuple[CameraMarginal, ...]:
+    """Measured areas of target and surface with 1, 2, ... cameras."""
+    scene, planned = partial.scene, len(partial.cameras)
+    sets = scene.target_samples(DRAWS.claims), scene.surface_samples(DRAWS.claims)
+    of_plan = claims.coverage.target.measured_m2, claims.coverage.surface.measured_m2
+
+    def areas(cameras: Sequence[PlannedCamera]) -> tuple[float, float]:
+        a, b = (
+            samples.samples.weight
+            * int(measured_views(scene, cameras, samples).measured.sum())
+            for samples in sets
+        )
+        return a, b
+
+    by_count: Mapping[int, Sequence[PlannedCamera]] = partial.stage.by_count
+    rows: dict[int, tuple[float, float]] = {}
+    for n, cameras in sorted(by_count.items()):
+        a, b = of_plan if n == planned else areas(cameras)
+        if n > planned:
+            # A camera added to the planned ones can't measure less than they do.
+            a, b = max(a, rows[n - 1][0]), max(b, rows[n - 1][1])
+        rows[n] = a, b
+    return tuple(
+        CameraMarginal(n_cameras=n, measured_target_m2=a, measured_surface_m2=b)
+        for n, (a, b) in rows.items()
+    )

@@ -1,0 +1,22 @@
+"""What can't be asked together, told before any work."""
+
+from planning.report.partial_plan import PlanRequest
+
+from .cameras_alone.refusals import check_alone
+from .carried import check_carried
+from .joint.joining import check_joint
+from .surviving import check_survival
+
+
+def check_request(request: PlanRequest) -> None:
+    """Refuse what can't be planned together.
+
+    Raises:
+        InputError: It names both, and what to do.
+    """
+    check_carried(request)
+    check_survival(request)
+    if request.wishes.joint:
+        check_joint(request)
+    if request.wishes.pattern == "none":
+        check_alone(request)

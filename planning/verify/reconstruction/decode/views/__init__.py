@@ -1,0 +1,1 @@
+"""Pairs of cameras that see the same texture: where their images match."""
