@@ -141,8 +141,11 @@ def expected_noise_px(
     if limits.light is None or isinstance(coded, CodedPixels):
         return edge
     n = len(edge)
+    rays, distances, facing = np.zeros((3, n))
+    jacobian, off_centre = np.zeros((2, n, 2))
     axis = ViewedSamples(
-        np.full(n, SEEN, dtype=np.int8), *np.zeros((3, n)), *np.zeros((2, n, 2))
+        *(np.full(n, SEEN, dtype=np.int8), rays, distances),
+        *(facing, jacobian, off_centre),
     )
     image_px_m = np.full(n, away_m / limits.light.focal_px)
     return together(code_noise(light, coded, axis, image_px_m, limits).image_px, n)

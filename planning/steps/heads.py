@@ -121,8 +121,9 @@ def _placed(
         stations=(),
         n_reference=len(planned) + len(reference),
         count=count,
-        **({} if way is None else {"way_m": way}),
     )
+    if way is not None:
+        record = record.changed(way_m=way)
     return PartialPlan(
         ready,
         lights,

@@ -37,7 +37,7 @@ from .stages import short_of
 # Numbers of either device that steps are looked for, at most.
 _MOST_LAMPS, _MOST_EYES = 2, 3
 # Shares that are asked of samples beyond what is required, until fresh ones confirm it.
-_SPARE = (0.0, 0.01, 0.02, 0.04)
+_SPARE = (0.01, 0.02, 0.04)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,16 +73,17 @@ def planned_on_turntable(
     search = StepSearch.of(scene, sets)
     with clock.stage("turntable", "turntable: the fewest devices and steps"):
         traded = _traded(search, request, clock)
-    steps = traded.steps
+    partial = _placed(ready, search, traded, traded.steps, clock)
+    plan = write_plan(partial, clock)
     for spare in _SPARE:
-        if spare:
-            clock.say("  fresh samples fall short: more is asked of the others")
-            asked = StepSearch.of(_asking_more(scene, spare), sets)
-            steps = asked.fewest(*traded.taken, traded.most)[0] or steps
-        partial = _placed(ready, search, traded, steps, clock)
-        plan = write_plan(partial, clock)
         if not any(short_of(plan)):
             break
+        clock.say("  fresh samples fall short: more is asked of the others")
+        asked = StepSearch.of(_asking_more(scene, spare), sets)
+        steps, _ = asked.fewest(*traded.taken, traded.most)
+        if steps is not None:
+            partial = _placed(ready, search, traded, steps, clock)
+            plan = write_plan(partial, clock)
     return plan, partial
 
 

@@ -50,10 +50,8 @@ class PredictedSigma(Part):
     noise_median_m: float | None = None
     noise_p95_m: float | None = None
     terms_rms_m: dict[
-        Literal[
-            *("edges", "light", "phase", "rings", "linearity"),
-            *("matches", "camera", "projector"),
-        ],
+        Literal["edges", "light", "phase", "rings", "linearity"]
+        | Literal["matches", "camera", "projector"],
         float,
     ] = Field(default={})
 

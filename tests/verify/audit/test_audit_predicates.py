@@ -225,6 +225,8 @@ def test_the_audit_imports_nothing_of_the_planner():
         "planning.model.document.coverage_records",
         "planning.model.document.input_records",
         "planning.model.document.ring_records",
+        "planning.model.document.head_records",
+        "planning.model.document.station_records",
         "planning.model.document.survival_records",
         "planning.model.light.dense_code",
         "planning.model.light.drawn_edges",

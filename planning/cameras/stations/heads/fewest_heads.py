@@ -77,10 +77,9 @@ def fewest_heads(
     """
     scene, heads = source.scene, source.over(n)
     sets = HeadSets.of(scene, heads, scene.target_samples(DRAWS.cameras))
+    heads, sets = _with_better(source, heads, sets, n, least)
+    found = _fewest_of(source, heads, sets, most)
     for draw in range(_ROUNDS):
-        if not draw:
-            heads, sets = _with_better(source, heads, sets, n, least)
-        found = _fewest_of(source, heads, sets, most)
         fresh = scene.target_samples(DRAWS.fresh_cameras.later(1 + draw))
         again = HeadSets.of(scene, heads, fresh)
         met = found.needed <= most
@@ -89,6 +88,7 @@ def fewest_heads(
         some = np.arange(0, len(fresh), _JOINING)
         part = HeadSets(fresh.take(some), again.lit[some], again.measured[some])
         sets = sets.with_samples(part)
+        found = _fewest_of(source, heads, sets, most)
     return found
 
 
@@ -185,11 +185,9 @@ def _with_at(sets: HeadSets, k: int, one: HeadSets) -> HeadSets:
 
 def _lacking_with_each(cover: HeadCover, others: HeadSets, offered: HeadSets) -> Ints:
     """Return how many rows are lacking of other heads and each one offered, (k,)."""
-    both = replace(cover, sets=others.beside(offered))
-    n = others.lit.shape[1]
-    fixed, covers = np.arange(n), both.covers
+    n, covers = others.lit.shape[1], replace(cover, sets=others.beside(offered)).covers
     rows, floors = cover.quotas.regions.row, cover.quotas.floors
-    served = covers[:, fixed].any(axis=1)[:, None] | covers[:, n:]
+    served = np.any(covers[:, :n], axis=1, keepdims=True) | covers[:, n:]
     counts = np.stack(
         [
             np.bincount(rows, weights=column, minlength=len(floors))

@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from geometry.arrays import Array, Ints
+from geometry.arrays import Array, Ints, Mask
 from planning.model.device_poses import moved_to
 from planning.model.heads import Turntable
 from planning.model.planned import PlannedCamera, PlannedProjector
@@ -124,16 +124,12 @@ class TableLattice:
             (pose,) = aimed_poses(place, aim, axis, template.device)
             yield moved_to(template, pose)
 
-    def room(self, device: Device) -> np.ndarray:
+    def room(self, device: Device) -> Mask:
         """Return which places of a device's circle the room leaves, (n_places,)."""
         low, high = self._shell(device)
         play = off_axis_m(self.table, self.space)
-        places = np.stack(
-            [
-                self.placed(device, k).world_from_device[:3, 3]
-                for k in range(self.n_places)
-            ]
-        )
+        turns = [self.table.turn(self.angle(k)) for k in range(self.n_places)]
+        places = (np.stack(turns) @ device.world_from_device)[:, :3, 3]
         offsets = places - np.array(self.space.centre)
         return admissible(self.space, (low - play, high + play), offsets)
 
