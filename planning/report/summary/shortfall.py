@@ -280,6 +280,9 @@ def _remedies(kind: str, document: PlanDocument, share: float) -> tuple[str, ...
     if gone := used_up(document, kind.removesuffix("s")):
         of_any = f"with any number of each {needed.count} would do"
         return (f"more of {gone} in stock: {of_any}", f"or {accept}")
+    told = document.stations
+    if told is not None and told.count and told.count.needed > told.count.count:
+        return f"--max-heads {told.count.needed} would do", f"or {accept}"
     # Where bodies are in the way, more devices may be no help.
     in_vain = needed.count <= proof.but_for_bodies
     if allowed is None or needed.count <= allowed or in_vain:

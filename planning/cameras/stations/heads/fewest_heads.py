@@ -77,8 +77,8 @@ def fewest_heads(
     """
     scene, heads = source.scene, source.over(n)
     sets = HeadSets.of(scene, heads, scene.target_samples(DRAWS.cameras))
-    heads, sets = _with_better(source, heads, sets, n, least)
-    found = _fewest_of(source, heads, sets, most)
+    heads, sets, known = _with_better(source, heads, sets, n, least)
+    found = _fewest_of(source, heads, sets, most, known)
     for draw in range(_ROUNDS):
         fresh = scene.target_samples(DRAWS.fresh_cameras.later(1 + draw))
         again = HeadSets.of(scene, heads, fresh)
@@ -88,7 +88,7 @@ def fewest_heads(
         some = np.arange(0, len(fresh), _JOINING)
         part = HeadSets(fresh.take(some), again.lit[some], again.measured[some])
         sets = sets.with_samples(part)
-        found = _fewest_of(source, heads, sets, most)
+        found = _fewest_of(source, heads, sets, most, known)
     return found
 
 
@@ -98,33 +98,44 @@ def _with_better(
     sets: HeadSets,
     n: int,
     least: int,
-) -> tuple[tuple[PlacedHead, ...], HeadSets]:
-    """Return heads, and others around them as long as those save one."""
-    while True:
-        cover = HeadCover.of(source.scene, sets)
-        solution = solve_cover(cover.problem, seed=source.scene.seed, budget=_BUDGET)
-        needed = len(solution.selected)
-        if needed <= max(least, 1):
-            return heads, sets
-        moved = _moved_together(source, heads, cover, n, needed - 1)
+) -> tuple[tuple[PlacedHead, ...], HeadSets, Ints]:
+    """Return heads, and others around them as long as those save one.
+
+    And which of them are the fewest that were found so, none if none were.
+    """
+    cover, known = HeadCover.of(source.scene, sets), np.empty(0, dtype=np.int64)
+    solution = solve_cover(cover.problem, seed=source.scene.seed, budget=_BUDGET)
+    for count in range(len(solution.selected) - 1, max(least, 1) - 1, -1):
+        moved = _moved_together(source, heads, cover, n, count)
         if moved is None:
-            return heads, sets
+            break
+        known = np.arange(len(heads), len(heads) + count)
         heads = heads + moved
         sets = sets.beside(HeadSets.of(source.scene, moved, sets.target))
+        cover = HeadCover.of(source.scene, sets)
+    return heads, sets, known
 
 
 def _fewest_of(
-    source: HeadSource, heads: tuple[PlacedHead, ...], sets: HeadSets, most: int
+    source: HeadSource,
+    heads: tuple[PlacedHead, ...],
+    sets: HeadSets,
+    most: int,
+    known: Ints,
 ) -> FoundHeads:
     """Return the fewest of some heads whose housings don't collide.
 
     Of two that do, the one that measures less isn't offered again; the bound is of any.
+    Those known may be fewer than the search finds.
     """
     cover, seed = HeadCover.of(source.scene, sets), source.scene.seed
     first = solve_cover(cover.problem, seed=seed, budget=_PROOF_BUDGET)
     solution = first
     while True:
-        chosen, needed = solution.selected, len(solution.selected)
+        chosen = solution.selected
+        if len(known) and len(known) < len(chosen) and not cover.lacking(known):
+            chosen = known
+        needed = len(chosen)
         if needed > most:
             few = solve_max_coverage(cover.problem, most, seed=seed, budget=_BUDGET)
             chosen = few.selected
