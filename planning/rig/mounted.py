@@ -217,6 +217,12 @@ def _written(turn: np.ndarray, position_mm: np.ndarray) -> list[list[float]]:
 def _of_plan(path: Path, rig: Rig, only: Sequence[str] | None) -> Mounted:
     """Devices of a plan by their ids; under their names, where they stood already."""
     plan = RigPlan.load(path)
+    if (stations := plan.document.stations) is not None and not stations.cross:
+        raise InputError(
+            f"{path}: its devices measure by {len(stations.stations)} stations "
+            f"({stations.kind}), and devices that stand are evaluated as pairs of all; "
+            f"`plan verify` checks this plan, a CSV file of one station is evaluated"
+        )
     devices = {device.id: device for device in (*plan.projectors, *plan.cameras)}
     chosen = _chosen(list(devices), only, str(path))
     spaced = {r.id for r in plan.document.projectors if r.rings is not None}
