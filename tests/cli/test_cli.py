@@ -410,7 +410,8 @@ def test_options_of_the_main_job_are_completed(monkeypatch, capsys):
     monkeypatch.setenv("COMP_CWORD", "1")
     monkeypatch.setenv("_PLAN_COMPLETE", "bash_complete")
     _, out, _ = in_process(monkeypatch, capsys)
-    assert out.split() == ["plain,--max-projectors", "plain,--max-cameras"]
+    counts = ("projectors", "cameras", "heads")
+    assert out.split() == [f"plain,--max-{kind}" for kind in counts]
 
 
 def test_help_puts_every_option_into_a_group(monkeypatch, capsys):

@@ -33,7 +33,7 @@ _GROUPS = {
         *("accuracy_mm", "accuracy_of", "robust", "views", "survive"),
     ),
     "How it is sought": (
-        *("cameras_by", "prove", "seed", "time_limit", "threads", "no_check"),
+        *("cameras_by", "joint", "prove", "seed", "time_limit", "threads", "no_check"),
     ),
     "Output": (
         *("output", "no_patterns", "no_report"),

@@ -226,6 +226,7 @@ def test_the_audit_imports_nothing_of_the_planner():
         "planning.model.document.input_records",
         "planning.model.document.ring_records",
         "planning.model.document.head_records",
+        "planning.model.document.joint_records",
         "planning.model.document.station_records",
         "planning.model.document.survival_records",
         "planning.model.light.dense_code",
