@@ -46,7 +46,7 @@ class TableSets:
             lattice.placed(p, i) for p in lattice.projectors for i in range(places)
         ]
         eyes = [lattice.placed(c, k) for c in lattice.cameras for k in range(places)]
-        lit = np.equal(lit_stages(scene, lamps, target), LIT)
+        lit: Mask = lit_stages(scene, lamps, target) == LIT
         views = camera_views(scene, eyes, target)
         shape = (len(lattice.projectors), places, len(lattice.cameras), len(offsets), n)
         measured = np.zeros(shape, dtype=bool)
