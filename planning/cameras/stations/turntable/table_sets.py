@@ -65,9 +65,9 @@ class TableSets:
     def everywhere(self) -> HeadSets:
         """Return what any device lights, and any pair measures, as if of one."""
         n = len(self.target)
-        lit = self.lit.reshape(-1, n).any(axis=0)
-        measured = self.measured.reshape(-1, n).any(axis=0)
-        return HeadSets(self.target, lit[:, None], measured[:, None])
+        lit = np.any(self.lit.reshape(-1, n), axis=0, keepdims=True)
+        measured = np.any(self.measured.reshape(-1, n), axis=0, keepdims=True)
+        return HeadSets(self.target, lit.T, measured.T)
 
     def steps_of(
         self, lamps: Sequence[Place], eyes: Sequence[Place] | None
