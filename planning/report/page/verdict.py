@@ -8,6 +8,7 @@ from planning.model.words import percent
 from planning.report.summary.check_lines import unchecked
 from planning.report.summary.device_lines import devices_words
 from planning.report.summary.shortfall import shortfalls
+from planning.report.summary.station_lines import title_words
 
 from .markup import element, paragraphs, table
 
@@ -43,6 +44,10 @@ def headline(plan: RigPlan) -> str:
     devices = f"{devices_words(plan)} with {document.rig.light} light"
     if plan.cameras_alone:
         devices = f"{devices_words(plan)} alone, by the object's texture,"
+    if document.stations is not None:
+        devices = f"{title_words(document.stations)}, each of them by {devices}"
+        if document.stations.kind == "heads":
+            devices = f"{title_words(document.stations)}, of {devices_words(plan)},"
     target = {"dominant": "dominant regions", "surface": "whole surface"}
     sigma = plan.coverage.sigma
     exact = (
@@ -67,7 +72,9 @@ def _rows(plan: RigPlan) -> Iterator[tuple[str, str, str, str]]:
         ("projectors", asked.max_projectors, len(plan.projectors)),
         ("cameras", asked.max_cameras, len(plan.cameras)),
     ):
-        if most is not None and not (plan.cameras_alone and kind == "projectors"):
+        alone = plan.cameras_alone and kind == "projectors"
+        # Of stations it counts a device anew wherever it stands.
+        if most is not None and not alone and plan.document.stations is None:
             yield kind, f"at most {most}", str(have), _judged(have <= most)
     for what, part, whole, least in (
         (
