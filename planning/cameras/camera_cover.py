@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.model.words import area_words
+from planning.model.words import stopped_words
 from planning.proofs.conflicts import Interference
 from planning.proofs.device_stock import DeviceStock
 from planning.proofs.quotas import RegionFloors
@@ -215,14 +215,8 @@ def _nothing_measured(
             "so no camera measures any; the object may be too small for this rig"
         )
     counts = np.bincount(causes, minlength=pair_limits.MEASURED)
-    order = np.argsort(-counts, kind="stable")
     weight = samples.target.samples.weight
-    named = ", ".join(
-        f"{pair_limits.CAUSES[i]} {100.0 * counts[i] / len(causes):.0f} % "
-        f"({area_words(float(weight * counts[i]))})"
-        for i in order
-        if counts[i] >= 0.01 * len(causes)
-    )
+    named = stopped_words(counts.tolist(), pair_limits.CAUSES, weight)
     return (
         f"no camera of {len(candidates)} poses measures any lit sample; the limit that "
         f"stops each sample where it comes furthest is {named}"

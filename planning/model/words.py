@@ -37,3 +37,20 @@ def percent_as_share(value: object) -> object:
     if isinstance(value, str) and value.endswith("%"):
         return float(value[:-1]) / 100.0
     return value
+
+
+def stopped_words(
+    counts: Sequence[int], causes: Sequence[str], weight_m2: float
+) -> str:
+    """Return which cause stops how many samples, the most first.
+
+    Those that stop 1 % or more, in percent and as areas.
+    """
+    total = sum(counts)
+    order = sorted(range(len(counts)), key=lambda i: -counts[i])
+    return ", ".join(
+        f"{causes[i]} {100.0 * counts[i] / total:.0f} % "
+        f"({area_words(weight_m2 * counts[i])})"
+        for i in order
+        if counts[i] >= 0.01 * total
+    )

@@ -15,7 +15,6 @@ from planning.model.document.device_records import BaselineRow
 from planning.model.document.input_records import (
     EvaluationRecord,
     RigRecord,
-    SurfaceRecord,
     Units,
 )
 from planning.model.document.plan_document import (
@@ -94,7 +93,7 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
         command=partial.request.command,
         truncated=partial.truncated,
         meshes=(entries.mesh_record(scene.mesh, scene.shell),),
-        surface=_surface_record(partial, surface),
+        surface=entries.surface_record(partial.ready, surface),
         rig=rig,
         requirements=requirements,
         regions=regions,
@@ -183,18 +182,6 @@ def _models_of(
         return None
     place = {template.model: k for k, template in enumerate(templates)}
     return np.array([place[device.model] for device in reference])
-
-
-def _surface_record(partial: PartialPlan, surface: Surface) -> SurfaceRecord:
-    return SurfaceRecord(
-        path="surface.npz",
-        sha256=surface.sha256(),
-        curvature_radius_m=partial.ready.curvature_radius_m,
-        dominant_share=partial.ready.regions.dominant_share,
-        selection=entries.selection_record(
-            partial.scene.mesh, partial.scene.region, partial.request.interest
-        ),
-    )
 
 
 def _final_requirements(scene: Scene, claims: Claims, devices: Devices) -> Requirements:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from planning.cameras.camera_cover import n_fixed
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.planned import PlannedCamera
-from planning.model.words import area_words
+from planning.model.words import stopped_words
 from planning.proofs.candidate_certificate import PlannedStage, certified
 from planning.proofs.quotas import Quotas, RegionFloors
 from planning.proofs.selection import Selection
@@ -167,14 +167,7 @@ def _nothing_measured(scene: Scene, candidates: CandidateViews, target: Target) 
     few = candidates.cameras[:: max(1, len(candidates.cameras) // _FEW)]
     causes = unseen_causes(scene, few, target, measured_views(scene, few, target))
     counts = np.bincount(causes, minlength=MEASURED_BY_VIEWS)[:MEASURED_BY_VIEWS]
-    order = np.argsort(-counts, kind="stable")
-    weight = target.samples.weight
-    named = ", ".join(
-        f"{VIEW_CAUSES[i]} {100.0 * counts[i] / len(target):.0f} % "
-        f"({area_words(float(weight * counts[i]))})"
-        for i in order
-        if counts[i] >= 0.01 * len(target)
-    )
+    named = stopped_words(counts.tolist(), VIEW_CAUSES, target.samples.weight)
     return (
         f"no pair of cameras of {len(candidates.cameras)} poses measures any sample; "
         f"the limit that stops each sample where it comes furthest is {named}"

@@ -24,13 +24,15 @@ from planning.model.document.device_records import (
 from planning.model.document.input_records import (
     MeshRecord,
     SelectionRecord,
+    SurfaceRecord,
 )
 from planning.model.document.part import Vector3
 from planning.model.document.ring_records import OtherAxes, OtherRings, RingAxes
 from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.surface import Surface
 from planning.report.claims import Claims
 from planning.report.judged import Devices
-from planning.report.partial_plan import PartialPlan
+from planning.report.partial_plan import PartialPlan, Prepared
 from planning.rings.ring_shares import ring_shares
 from planning.rings.ring_stage import RingStage
 from planning.scene.interest import Interest
@@ -182,6 +184,18 @@ def selection_record(
         n_faces=int(chosen.sum()),
         area_m2=float(mesh.face_areas[chosen].sum()),
         n_removed_by_repair=interest.n_removed,
+    )
+
+
+def surface_record(ready: Prepared, surface: Surface) -> SurfaceRecord:
+    """Return the plan's `surface`."""
+    scene = ready.scene
+    return SurfaceRecord(
+        path="surface.npz",
+        sha256=surface.sha256(),
+        curvature_radius_m=ready.curvature_radius_m,
+        dominant_share=ready.regions.dominant_share,
+        selection=selection_record(scene.mesh, scene.region, ready.request.interest),
     )
 
 

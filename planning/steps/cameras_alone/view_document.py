@@ -15,7 +15,7 @@ from planning.cameras.photogrammetry.view_stage import ViewStage
 from planning.model.bodies import Obstacle
 from planning.model.document.certificates import Certificates
 from planning.model.document.coverage_records import CameraMarginal
-from planning.model.document.input_records import RigRecord, SurfaceRecord, Units
+from planning.model.document.input_records import RigRecord, Units
 from planning.model.document.plan_document import (
     FORMAT,
     VERSION,
@@ -87,7 +87,7 @@ def write_view_plan(partial: ViewPlan, clock: Stopwatch) -> RigPlan:
         command=partial.request.command,
         truncated=partial.truncated,
         meshes=(entries.mesh_record(scene.mesh, scene.shell),),
-        surface=_surface_record(partial, surface),
+        surface=entries.surface_record(partial.ready, surface),
         rig=rig,
         requirements=_final_requirements(scene, claims, devices),
         regions=regions,
@@ -153,18 +153,6 @@ def _surface(scene: Scene, devices: Devices) -> Surface:
         none,
         np.stack([c.world_from_device for c in devices.reference_cameras]),
         tuple(Obstacle(solid.name, solid.mesh) for solid in scene.obstructions),
-    )
-
-
-def _surface_record(partial: ViewPlan, surface: Surface) -> SurfaceRecord:
-    return SurfaceRecord(
-        path="surface.npz",
-        sha256=surface.sha256(),
-        curvature_radius_m=partial.ready.curvature_radius_m,
-        dominant_share=partial.ready.regions.dominant_share,
-        selection=entries.selection_record(
-            partial.scene.mesh, partial.scene.region, partial.request.interest
-        ),
     )
 
 

@@ -3,17 +3,13 @@
 from dataclasses import dataclass, replace
 from functools import partial
 
-import numpy as np
-
 from geometry.mesh.sampling import sample_surface
 from geometry.parallel import n_threads
 from planning.verify.reconstruction.check.accuracy import (
     Expected,
-    judge,
-    measure_accuracy,
+    held_against,
     measure_completeness,
     share_of,
-    shown_inside,
 )
 from planning.verify.reconstruction.check.merge import Merged, merge
 from planning.verify.reconstruction.check.overlaps import ring_pitch_px
@@ -243,16 +239,8 @@ def _judged(
         everything, merged.cloud, expected, limits.tau_m
     )
     pairs = tuple(PairCount.of(plan, pair, gave) for pair, gave in decoded)
-    inside = np.zeros(0, dtype=bool)
-    accuracy, why = None, rejection(pairs) or "nothing was decoded"
-    failures: tuple[str, ...] = (f"no point was measured: {why}",)
-    if len(merged.cloud):
-        places = [camera.centre for camera in plan.cameras]
-        inside = shown_inside(merged.cloud, places, plan.mesh)
-        failures = ("no point was measured of the outside of the open mesh",)
-    if not inside.all():
-        accuracy = measure_accuracy(merged.cloud.take(~inside), plan.mesh)
-        failures = judge(accuracy, completeness, limits)
+    nothing = f"no point was measured: {rejection(pairs) or 'nothing was decoded'}"
+    accuracy, failures, inside = held_against(merged.cloud, plan, completeness, nothing)
     if accuracy is not None and failures:
         measured = MeasuredClouds(
             plan, decoded, pairs, everything, expected, completeness.missing

@@ -13,18 +13,18 @@ References:
 """
 
 import heapq
-from dataclasses import replace
 from itertools import count
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.covers.answers import NONE, ExactSearch, Incumbent
+from solvers.covers.answers import ExactSearch, Incumbent
 from solvers.covers.bounds.reduced_cover import ReducedCover
 from solvers.covers.search.prices import Prices
 from solvers.status import WorkBudget
 
 from .group_bounds import GroupPart, PartBounds
+from .group_parts import children, only_selection
 
 # Larger covers aren't searched: the dense copy takes four bytes an entry, the table
 # of what is alike four for each pair of sets.
@@ -37,9 +37,6 @@ _BATCH = 48
 _MAX_OPEN = 600_000_000
 # Steps for the whole, and for a part that starts from its parent's multipliers.
 _FIRST_STEPS, _STEPS = 200, 40
-# Sets about which a group is tried, and the least likeness of its members.
-_CENTRES = 6
-_LIKENESS = (0.6, 0.3)
 
 
 def best_by_groups(
@@ -109,7 +106,8 @@ class _Tree(Incumbent):
                 return ExactSearch(self.selected, self.weight, upper, complete=False)
             split: list[GroupPart] = []
             while self._promising and len(split) < _BATCH:
-                split += self._children(heapq.heappop(self._open)[2])
+                part = heapq.heappop(self._open)[2]
+                split += children(part, self.n_sets, self._alike)
             self._take(split, _STEPS)
         return ExactSearch(self.selected, self.weight, self.refuted, complete=True)
 
@@ -127,7 +125,7 @@ class _Tree(Incumbent):
         still: list[GroupPart] = []
         parts = [part for part in parts if self._may_meet_floors(part)]
         for part in self.bounds.lowered(parts, steps):
-            only = self._only(part)
+            only = only_selection(part, self.n_sets)
             if only is not None:
                 self._try(np.sort(only))
                 continue
@@ -154,57 +152,6 @@ class _Tree(Incumbent):
         weights = self.cover.by_row_set(np.where(covered, self.cover.weights, 0.0))
         if np.all(weights >= self.cover.quotas) or not self.cover.floored:
             self.offer(chosen, float(weights.sum()))
-
-    def _only(self, part: GroupPart) -> NDArray[np.int64] | None:
-        """Return the selection that covers all that a part's can, if it is one."""
-        if any(group.size > 1 for group in part.groups):
-            return None
-        taken = np.concatenate([NONE, *part.groups])
-        if taken.size == self.n_sets:
-            return taken
-        others = np.setdiff1d(np.flatnonzero(~part.closed), taken)
-        spare = self.n_sets - taken.size
-        return np.concatenate([taken, others]) if others.size <= spare else None
-
-    def _children(self, part: GroupPart) -> list[GroupPart]:
-        """Return the part without a group, and with at least one of it."""
-        home, group = self._group(part)
-        closed = part.closed.copy()
-        closed[group] = True
-        others = tuple(other for i, other in enumerate(part.groups) if i != home)
-        without = others
-        if home >= 0:
-            without += (np.setdiff1d(part.groups[home], group),)
-        part = replace(part, pace=(1.0, 0), costliest=NONE)
-        fewer = replace(part, closed=closed, groups=without)
-        return [replace(part, groups=(*others, group)), fewer]
-
-    def _group(self, part: GroupPart) -> tuple[int, NDArray[np.int64]]:
-        """Return the group that holds the sets to branch on, or -1, and the sets."""
-        home = np.full(part.closed.size, -1)
-        for i, group in enumerate(part.groups):
-            home[group] = i if group.size > 1 else -2
-        if len(part.groups) == self.n_sets:
-            home[home == -1] = -2
-        free = ~part.closed & (home != -2)
-        mean = np.where(free, part.primal, -1.0)
-        best, chosen = -np.inf, (-1, np.empty(0, dtype=np.int64))
-        for centre in np.argsort(-mean, kind="stable")[:_CENTRES]:
-            if not free[centre]:
-                break
-            near = free & (home == home[centre])
-            for least in _LIKENESS:
-                group = np.flatnonzero(near & (self._alike[centre] >= least))
-                if home[centre] >= 0 and group.size == part.groups[home[centre]].size:
-                    break
-                share = float(part.primal[group].sum())
-                worth = min(share, 1.0 - share)
-                if worth > best:
-                    best, chosen = worth, (int(home[centre]), group)
-        if chosen[1].size:
-            return chosen
-        largest = int(np.argmax([group.size for group in part.groups]))
-        return largest, part.groups[largest][: part.groups[largest].size // 2]
 
 
 def _table_units(cover: ReducedCover) -> float:

@@ -6,14 +6,14 @@ the target, or where it is down to one selection.
 """
 
 import heapq
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import count
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.covers.answers import NONE
 from solvers.covers.exact.group_bounds import GroupPart
+from solvers.covers.exact.group_parts import children, only_selection
 from solvers.status import WorkBudget
 
 from .pair_bounds import PairBounds
@@ -25,8 +25,6 @@ _MAX_OPEN = 600_000_000
 # where splitting costs less than bounding well.
 _FIRST_STEPS, _STEPS, _LEAST_STEPS = 200, 40, 10
 _SMALL = 50_000.0
-_CENTRES = 6
-_LIKENESS = (0.6, 0.3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +88,8 @@ class PairTree:
                 break
             split: list[GroupPart] = []
             while self._promising and len(split) < _BATCH:
-                split += self._children(heapq.heappop(self._open)[2])
+                part = heapq.heappop(self._open)[2]
+                split += children(part, self.n_sets, self._likeness())
             self._take(split, _STEPS)
         left = -self._open[0][0] if self._promising else self.target - 1.0
         bound = max(self.weight, min(left, self.cover.total))
@@ -111,7 +110,7 @@ class PairTree:
         steps = max(_LEAST_STEPS, int(steps * min(1.0, self.cover.size / _SMALL)))
         several: list[GroupPart] = []
         for part in parts:
-            only = self._only(part)
+            only = only_selection(part, self.n_sets)
             if only is None:
                 several.append(part)
             else:
@@ -128,58 +127,6 @@ class PairTree:
         if weight >= self.target:
             self.selected, self.weight = np.sort(chosen), weight
             self.target = weight + self.cover.grain
-
-    def _only(self, part: GroupPart) -> NDArray[np.int64] | None:
-        """Return the selection that covers all that a part's can, if it is one."""
-        if any(group.size > 1 for group in part.groups):
-            return None
-        taken = np.concatenate([NONE, *part.groups])
-        if taken.size == self.n_sets:
-            return taken
-        others = np.setdiff1d(np.flatnonzero(~part.closed), taken)
-        spare = self.n_sets - taken.size
-        return np.concatenate([taken, others]) if others.size <= spare else None
-
-    def _children(self, part: GroupPart) -> list[GroupPart]:
-        """Return the part without a group, and with at least one of it."""
-        home, group = self._group(part)
-        closed = part.closed.copy()
-        closed[group] = True
-        others = tuple(other for i, other in enumerate(part.groups) if i != home)
-        without = others
-        if home >= 0:
-            without += (np.setdiff1d(part.groups[home], group),)
-        part = replace(part, pace=(1.0, 0), costliest=NONE)
-        fewer = replace(part, closed=closed, groups=without)
-        return [replace(part, groups=(*others, group)), fewer]
-
-    def _group(self, part: GroupPart) -> tuple[int, NDArray[np.int64]]:
-        """Return the group that holds the sets to branch on, or -1, and the sets."""
-        home = np.full(part.closed.size, -1)
-        for i, group in enumerate(part.groups):
-            home[group] = i if group.size > 1 else -2
-        if len(part.groups) == self.n_sets:
-            home[home == -1] = -2
-        free = ~part.closed & (home != -2)
-        mean = np.where(free, part.primal, -1.0)
-        alike = self._likeness()
-        best, chosen = -np.inf, (-1, NONE)
-        for centre in np.argsort(-mean, kind="stable")[:_CENTRES]:
-            if not free[centre]:
-                break
-            near = free & (home == home[centre])
-            for least in _LIKENESS:
-                group = np.flatnonzero(near & (alike[centre] >= least))
-                if home[centre] >= 0 and group.size == part.groups[home[centre]].size:
-                    break
-                share = float(part.primal[group].sum())
-                worth = min(share, 1.0 - share)
-                if worth > best:
-                    best, chosen = worth, (int(home[centre]), group)
-        if chosen[1].size:
-            return chosen
-        largest = int(np.argmax([group.size for group in part.groups]))
-        return largest, part.groups[largest][: part.groups[largest].size // 2]
 
     def _likeness(self) -> NDArray[np.float32]:
         """Return the weighted Jaccard index of what sets see, shape (n_s, n_s)."""

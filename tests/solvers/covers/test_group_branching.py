@@ -12,6 +12,7 @@ from solvers.covers.cover import solve_cover, solve_max_coverage
 from solvers.covers.cover_problem import CoverProblem
 from solvers.covers.exact.group_bounds import PartBounds
 from solvers.covers.exact.group_branching import _Tree, best_by_groups
+from solvers.covers.exact.group_parts import children, only_selection
 from solvers.covers.search.prices import Prices
 from solvers.status import SolveStatus, WorkBudget
 
@@ -116,14 +117,12 @@ def test_children_share_out_the_selections_of_a_part(seed):
     parts = [tree.bounds.whole(np.ones(cover.weights.size))]
     assert np.all(held(parts[0]))
     for _ in range(4):
-        split = [part for part in parts if tree._only(part) is None]
+        split = [part for part in parts if only_selection(part, tree.n_sets) is None]
         parts = []
         for part in tree.bounds.lowered(split, 10):
-            children = tree._children(part)
-            assert np.array_equal(
-                sum(held(child) * 1 for child in children), held(part)
-            )
-            parts += children
+            split = children(part, tree.n_sets, tree._alike)
+            assert np.array_equal(sum(held(child) * 1 for child in split), held(part))
+            parts += split
         parts = parts[:6]
 
 

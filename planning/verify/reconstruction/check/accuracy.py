@@ -13,6 +13,7 @@ from geometry.rays.rays import RayCaster
 from planning.model.requirements import CheckLimits
 from planning.verify.reconstruction.arrays import Array, Columns, Indices, Mask
 from planning.verify.reconstruction.cloud import Cloud
+from planning.verify.reconstruction.scanner import Scanner
 
 _MM = 1e3
 
@@ -200,3 +201,26 @@ def judge(
 def share_of(values: Mask) -> float:
     """Return the share that is true; 0 of none."""
     return float(np.mean(values)) if len(values) else 0.0
+
+
+def held_against(
+    cloud: Cloud,
+    plan: Scanner,
+    completeness: Completeness,
+    nothing: str,
+) -> tuple[Accuracy | None, tuple[str, ...], Mask]:
+    """Hold merged points against the object and the limits.
+
+    Returns the accuracy of those outside of it, None without any; failures, which are
+    `nothing` of no point at all; and which points lie inside, shape (n,).
+    """
+    inside = np.zeros(0, dtype=bool)
+    failures: tuple[str, ...] = (nothing,)
+    if len(cloud):
+        places = [camera.centre for camera in plan.cameras]
+        inside = shown_inside(cloud, places, plan.mesh)
+        failures = ("no point was measured of the outside of the open mesh",)
+    if inside.all():
+        return None, failures, inside
+    accuracy = measure_accuracy(cloud.take(~inside), plan.mesh)
+    return accuracy, judge(accuracy, completeness, plan.limits.check), inside

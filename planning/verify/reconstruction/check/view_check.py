@@ -27,11 +27,9 @@ from planning.verify.reconstruction.scanner import Scanner
 
 from .accuracy import (
     Expected,
-    judge,
-    measure_accuracy,
+    held_against,
     measure_completeness,
     share_of,
-    shown_inside,
 )
 from .calibration_sigma import calibration_sigma
 from .dense_merge import merge_dense
@@ -218,15 +216,8 @@ def _judged(
     completeness = measure_completeness(
         everything, merged.cloud, expected.within(plan.target), limits.tau_m
     )
-    accuracy, inside = None, np.zeros(0, dtype=bool)
-    failures: tuple[str, ...] = ("no point was measured: no images matched",)
-    if len(merged.cloud):
-        places = [camera.centre for camera in plan.cameras]
-        inside = shown_inside(merged.cloud, places, plan.mesh)
-        failures = ("no point was measured of the outside of the open mesh",)
-    if not inside.all():
-        accuracy = measure_accuracy(merged.cloud.take(~inside), plan.mesh)
-        failures = judge(accuracy, completeness, limits)
+    nothing = "no point was measured: no images matched"
+    accuracy, failures, inside = held_against(merged.cloud, plan, completeness, nothing)
     return Reconstruction(
         everything,
         merged,
