@@ -19,6 +19,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,7 @@ from planning import RigPlan
 from planning.verify.audit.audit import audit_plan
 
 ROOT = Path(__file__).resolve().parents[2]
+_MANY = ("--max-projectors", "3")
 RUN = [sys.executable, "-c", "from planning.cli.main import main; main()"]
 
 
@@ -48,10 +50,10 @@ def main() -> int:
     codes: list[int] = []
     for mesh, words, lights in _jobs(sys.argv[1:]):
         for light in lights:
-            code, row, timings = run(mesh, (*words, "--light", light), light)
-            codes.append(code)
-            stages.append(f"| {mesh.name} | {light} | {timings} |")
-            print(row, flush=True)
+            done = run(mesh, (*_MANY, *words, "--light", light))
+            codes.append(done.code)
+            stages.append(f"| {mesh.name} | {light} | {_timings(done)} |")
+            print(f"| {mesh.name} | {light} | {_row(done)} |", flush=True)
     print("\nSeconds of each stage:\n\n| mesh | light | stages |\n|---|---|---|")
     print("\n".join(stages))
     return int(any(code not in (0, 1, 4) for code in codes))
@@ -80,29 +82,45 @@ def _help_seconds() -> float:
     return statistics.median(seconds)
 
 
-def run(
-    mesh: Path, words: tuple[str, ...], label: str, *, most: int = 3
-) -> tuple[int, str, str]:
-    """Return the exit code, the row of the table, and the seconds of the stages."""
+@dataclass(frozen=True)
+class Run:
+    """A plan made by the command line in a process of its own.
+
+    Attributes:
+        plan: None: none was written; then `said` is what the process told.
+        wall: Seconds from start to end.
+    """
+
+    code: int
+    wall: float
+    plan: RigPlan | None
+    said: str
+
+
+def run(mesh: Path, words: tuple[str, ...]) -> Run:
+    """Plan a mesh, and read what was written."""
     with tempfile.TemporaryDirectory() as folder:
-        command = [*RUN, "--mesh", str(mesh), "--max-projectors", str(most), "--quiet"]
-        command += ["-o", folder, *words]
+        command = [*RUN, "--mesh", str(mesh), "--quiet", "-o", folder, *words]
         begin = time.perf_counter()
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         wall = time.perf_counter() - begin
         written = Path(folder) / "plan.json"
         plan = RigPlan.load(written) if written.exists() else None
-    code = done.returncode
-    start = f"| {mesh.name} | {label} | {code} |"
+    said = " ".join(done.stderr.replace(str(mesh), "FILE").split())[:160]
+    return Run(done.returncode, wall, plan, said)
+
+
+def _timings(done: Run) -> str:
+    if done.plan is None:
+        return "no plan"
+    times = done.plan.to_document()["timings_s"].items()
+    return ", ".join(f"{stage} {seconds:.1f}" for stage, seconds in times)
+
+
+def _row(done: Run) -> str:
+    plan = done.plan
     if plan is None:
-        said = " ".join(done.stderr.replace(str(mesh), "FILE").split())[:160]
-        return code, f"{start} | | | {wall:.1f} | {said} | | | | | | |", "no plan"
-    times = plan.to_document()["timings_s"].items()
-    timings = ", ".join(f"{stage} {seconds:.1f}" for stage, seconds in times)
-    return code, f"{start} {_row(plan, wall)} |", timings
-
-
-def _row(plan: RigPlan, wall: float) -> str:
+        return f"{done.code} | | | {done.wall:.1f} | {done.said} | | | | | |"
     document, areas = plan.to_document(), plan.to_document()["coverage"]["target"]
     counts = [
         f"{proof['count']} of {proof['needed']['count']} needed "
@@ -121,26 +139,33 @@ def _row(plan: RigPlan, wall: float) -> str:
         )
     size = 1e3 * np.ptp(plan.surface.mesh.bounds, axis=0).max()
     cells = [
+        str(done.code),
         str(document["meshes"][0]["n_faces"]),
         f"{size:.1f}",
         str(len(document["regions"])),
-        f"{wall:.1f}",
+        f"{done.wall:.1f}",
         *counts,
         f"{lit:.1%}",
         f"{measured:.1%}",
         *seen,
-        f"{_difference(plan):.2f} points",
+        f"{audited(plan)[1]:.2f} points",
     ]
     return " | ".join(cells)
 
 
-def _difference(plan: RigPlan) -> float:
-    found = audit_plan(plan, seed=20_261_121).areas
-    return max(
-        100.0 * abs(found[part][key] - value) / claimed["area_m2"]
-        for part, claimed in plan.coverage.items()
-        if part in found
+def audited(plan: RigPlan) -> tuple[int, float]:
+    """Return how many claims the audit finds false, and the largest difference.
+
+    That is of a claimed area from the one recomputed, in points of the target's or the
+    surface's area.
+    """
+    found = audit_plan(plan, seed=20_261_121)
+    return len(found.failures), max(
+        100.0 * abs(found.areas[part][key] - value) / claimed["area_m2"]
+        for part, claimed in plan.to_document()["coverage"].items()
+        if part in found.areas
         for key, value in claimed.items()
+        if key in found.areas[part]
     )
 
 
