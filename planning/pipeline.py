@@ -1,8 +1,6 @@
 """From mesh to checked plan, read top to bottom like the paper's III to VI."""
 
-import time
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from typing import Literal
 
@@ -26,10 +24,11 @@ from planning.scene.interest import Select, Weight
 from planning.scene.ranges.ranged_body import RangedBody
 from planning.verify.verification import Verification, verify_plan
 
+from .steps.best_kept import Keep, Search, best_kept
 from .steps.cameras_alone.stages import planned_alone
 from .steps.carried import devices_of_heads, pattern_of_rig
 from .steps.checked import axes_may_help, missed_by, with_check
-from .steps.heads import planned_heads
+from .steps.heads import heads_sought
 from .steps.joint.joining import jointly
 from .steps.prepare import prepared, request_of, standing_devices
 from .steps.refused import check_request
@@ -44,12 +43,9 @@ from .steps.stages import (
 )
 from .steps.standing import as_they_stand
 from .steps.surviving import one_more_for_losses, placed_to_survive
-from .steps.turntable import planned_on_turntable
+from .steps.turntable import steps_sought
 
-Keep = Callable[[RigPlan], None]
 Checked = Callable[[RigPlan, Verification], None]
-# Time kept for writing, in times that writing the first plan took.
-_WRITING = 1.25
 
 
 def plan_rig(
@@ -225,55 +221,29 @@ def _evaluated(
 def _planned(
     request: PlanRequest, clock: Stopwatch, keep: Keep | None
 ) -> tuple[RigPlan, PartialPlan]:
-    """Devices, rings and proofs; one device more where fresh samples fall short.
-
-    With a time limit the first devices are written at once: that shows how long it
-    takes, and stands if there is no time to write better ones.
-
-    Raises:
-        InterruptedPlanError: If planning is interrupted; it carries the best plan.
-        TimeLimitError: If the time limit came before any plan was written.
-    """
+    """What the rig is planned by, and the best plan kept."""
     if request.wishes.max_heads is not None:
-        return planned_heads(request, clock)
-    if request.rig.turntable is not None:
-        return planned_on_turntable(request, clock)
-    partial = larger = begun = _first_plan(request, clock)
-    first = None
-    try:
-        if clock.limited:
-            first = _first_kept(begun, clock, keep)
-        while True:
-            partial = polished(larger, clock)
-            partial = bounded_cameras(partial, clock)
-            plan = write_plan(partial, clock)
-            larger = with_free_axes(partial, plan, clock)
-            larger = larger or one_more_for_losses(partial, plan, clock)
-            larger = larger or one_device_more(partial, plan, clock)
-            if larger is None:
-                return plan, partial
-    except KeyboardInterrupt:
-        clock.lift()
-        cut = replace(partial, truncated=True)
-        raise InterruptedPlanError(write_plan(cut, clock)) from None
-    except TIME_IS_UP:
-        clock.extend()
-        if first is None:
-            raise
-        with suppress(*TIME_IS_UP):
-            if partial is not begun:
-                first = write_plan(replace(partial, truncated=True), clock)
-        return first, partial
+        search = heads_sought(request, clock)
+    elif request.rig.turntable is not None:
+        search = steps_sought(request, clock)
+    else:
+        search = _devices_sought(request, clock)
+    return best_kept(search, write_plan, clock, keep)
 
 
-def _first_kept(partial: PartialPlan, clock: Stopwatch, keep: Keep | None) -> RigPlan:
-    """Write a plan that stands if the run is cut, and reserve time for another."""
-    begin = time.monotonic()
-    plan = write_plan(replace(partial, truncated=True), clock)
-    if keep is not None:
-        keep(plan)
-    clock.reserve(_WRITING * (time.monotonic() - begin))
-    return plan
+def _devices_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
+    """Devices, rings and proofs; one device more where fresh samples fall short."""
+    larger: PartialPlan | None = _first_plan(request, clock)
+    while larger is not None:
+        yield larger, False
+        partial = polished(larger, clock)
+        yield partial, False
+        partial = bounded_cameras(partial, clock)
+        plan = yield partial, True
+        assert plan is not None
+        larger = with_free_axes(partial, plan, clock)
+        larger = larger or one_more_for_losses(partial, plan, clock)
+        larger = larger or one_device_more(partial, plan, clock)
 
 
 def _first_plan(request: PlanRequest, clock: Stopwatch) -> PartialPlan:

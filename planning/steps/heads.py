@@ -17,21 +17,18 @@ from planning.model.document.station_records import (
 )
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.heads import Head
-from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
 from planning.model.words import count_words
 from planning.proofs import projector_bound
-from planning.report.assemble import write_plan
 from planning.report.partial_plan import PartialPlan, PlanRequest, Prepared
 
+from .best_kept import Search
 from .prepare import prepared
 from .stages import short_of
 
 
-def planned_heads(
-    request: PlanRequest, clock: Stopwatch
-) -> tuple[RigPlan, PartialPlan]:
-    """Return the fewest heads, or stations of one; one more where fresh samples ask.
+def heads_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
+    """Give the fewest heads, or stations of one; one more where fresh samples ask.
 
     Raises:
         InfeasibleLimitsError: If no head measures anything.
@@ -46,23 +43,38 @@ def planned_heads(
         *(ready.scene, head, space, ready.templates, ready.cameras),
         carried=request.rig.stations is not None,
     )
-    found, everywhere = _fewest(ready, source, most, clock)
+    found = _fewest(ready, source, most, clock)
+    partial = _placed(ready, head, found, None, clock)
+    yield partial, False
+    with clock.stage("bounds", "bounds over all poses of the workspace"):
+        effort = projector_bound.PROVE if request.prove else projector_bound.DEFAULT
+        everywhere = least_by_light(ready.scene, found.heads, ready.templates, effort)
+    partial = replace(partial, stationed=_bounded(partial.stationed, everywhere))
     while True:
-        partial = _placed(ready, head, found, everywhere, clock)
-        plan = write_plan(partial, clock)
+        plan = yield partial, True
+        assert plan is not None
         count = len(found.chosen)
         if not any(short_of(plan)) or found.needed > most or count >= most:
-            return plan, partial
+            return
         clock.say(f"  fresh samples fall short: {count_words(count + 1, 'head')}")
         found = found.with_one_more(ready.scene)
+        partial = _placed(ready, head, found, everywhere, clock)
+
+
+def _bounded(stationed: Stationed | None, everywhere: int | None) -> Stationed:
+    """The same with the bound over all poses."""
+    assert stationed is not None
+    record = stationed.record
+    assert record.count is not None
+    count = record.count.changed(everywhere=everywhere)
+    return replace(stationed, record=record.changed(count=count))
 
 
 def _fewest(
     ready: Prepared, source: HeadSource, most: int, clock: Stopwatch
-) -> tuple[FoundHeads, int | None]:
-    request, scene = ready.request, ready.scene
+) -> FoundHeads:
     with clock.stage("heads", "heads: candidates and cover"):
-        found = fewest_heads(source, request.rig.n_projector_poses, most)
+        found = fewest_heads(source, ready.request.rig.n_projector_poses, most)
         if not found.cover.sets.measured.any():
             raise InfeasibleLimitsError(
                 f"no head of {len(found.heads)} poses measures any part of the target; "
@@ -72,10 +84,7 @@ def _fewest(
             f"  {len(found.chosen)} of {len(found.heads)} candidates; at least "
             f"{found.lower_bound} are needed"
         )
-    with clock.stage("bounds", "bounds over all poses of the workspace"):
-        effort = projector_bound.PROVE if request.prove else projector_bound.DEFAULT
-        everywhere = least_by_light(scene, found.heads, ready.templates, effort)
-    return found, everywhere
+    return found
 
 
 def _placed(

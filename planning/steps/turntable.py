@@ -1,5 +1,6 @@
 """A plan of devices before a turntable, from their places to what is written."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,14 +24,13 @@ from planning.model.document.station_records import (
     TradeRow,
 )
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
 from planning.model.words import count_words
-from planning.report.assemble import write_plan
 from planning.report.partial_plan import PartialPlan, PlanRequest, Prepared
 from planning.scene.draws import DRAWS
 from planning.scene.scene import Scene
 
+from .best_kept import Search
 from .prepare import prepared
 from .stages import short_of
 
@@ -42,18 +42,14 @@ _SPARE = (0.01, 0.02, 0.04)
 
 @dataclass(frozen=True, eq=False)
 class _Traded:
-    """The fewest steps for each number of devices, and which of these is taken."""
+    """The fewest steps for each number of devices looked at so far."""
 
     rows: tuple[TradeRow, ...]
-    taken: tuple[int, int]
-    steps: Steps
-    most: int
+    found: dict[tuple[int, int], Steps]
 
 
-def planned_on_turntable(
-    request: PlanRequest, clock: Stopwatch
-) -> tuple[RigPlan, PartialPlan]:
-    """Return the fewest devices, or steps, and one look further where it falls short.
+def steps_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
+    """Give the fewest devices, or steps, and one look further where it falls short.
 
     With a number of cameras given, as few steps as that many devices allow; else as few
     devices as measure enough at all.
@@ -71,32 +67,58 @@ def planned_on_turntable(
     with clock.stage("turntable", "turntable: what pairs measure at every angle"):
         sets = TableSets.of(scene, lattice, scene.target_samples(DRAWS.cameras))
     search = StepSearch.of(scene, sets)
-    with clock.stage("turntable", "turntable: the fewest devices and steps"):
-        traded = _traded(search, request, clock)
-    partial = _placed(ready, search, traded, traded.steps, clock)
-    plan = write_plan(partial, clock)
+    most = table.max_steps or lattice.n_places
+    partial, traded = None, _Traded((), {})
+    for traded in _trades(search, request, most, clock):
+        if partial is None and traded.found:
+            taken = next(iter(traded.found))
+            partial = _placed(ready, search, traded, traded.found[taken], clock)
+            yield partial, False
+    if partial is None:
+        lamps, eyes = _counts(request)
+        raise InfeasibleLimitsError(
+            f"no {count_words(lamps, 'projector')} and {count_words(eyes, 'camera')} "
+            f"measure enough of the part at {most} angles of the table; allow more "
+            f"devices or steps, or another axis"
+        )
+    found = traded.found
+    taken = next(iter(found))
+    if request.wishes.max_cameras is not None:
+        taken = min(found, key=lambda pair: (len(found[pair].angles), sum(pair)))
+    partial = _placed(ready, search, traded, found[taken], clock)
+    plan = yield partial, True
     for spare in _SPARE:
+        assert plan is not None
         if not any(short_of(plan)):
-            break
+            return
         clock.say("  fresh samples fall short: more is asked of the others")
         asked = StepSearch.of(_asking_more(scene, spare), sets)
-        steps, _ = asked.fewest(*traded.taken, traded.most)
+        steps, _ = asked.fewest(*taken, most)
         if steps is not None:
-            partial = _placed(ready, search, traded, steps, clock)
-            plan = write_plan(partial, clock)
-    return plan, partial
+            proved = found[taken]
+            bounded = replace(steps, lower_bound=proved.lower_bound, proof=proved.proof)
+            partial = _placed(ready, search, traded, bounded, clock)
+            plan = yield partial, True
 
 
-def _traded(search: StepSearch, request: PlanRequest, clock: Stopwatch) -> _Traded:
-    """The fewest steps of each number of devices, and what is taken of them."""
-    table, wishes = search.sets.lattice.table, request.wishes
-    most = table.max_steps or search.sets.lattice.n_places
-    lamps = min(wishes.max_projectors, _MOST_LAMPS)
-    eyes = min(wishes.max_cameras or _MOST_EYES, _MOST_EYES)
+def _counts(request: PlanRequest) -> tuple[int, int]:
+    """Numbers of projectors and cameras that steps are looked for, at most."""
+    wishes = request.wishes
+    return (
+        min(wishes.max_projectors, _MOST_LAMPS),
+        min(wishes.max_cameras or _MOST_EYES, _MOST_EYES),
+    )
+
+
+def _trades(
+    search: StepSearch, request: PlanRequest, most: int, clock: Stopwatch
+) -> Iterator[_Traded]:
+    """Give the fewest steps of each number of devices, one number after another."""
     rows: list[TradeRow] = []
     found: dict[tuple[int, int], Steps] = {}
-    for pair in pairs_of_counts(lamps, eyes):
-        steps, least = search.fewest(*pair, most)
+    for pair in pairs_of_counts(*_counts(request)):
+        with clock.stage("turntable", "turntable: the fewest devices and steps"):
+            steps, least = search.fewest(*pair, most)
         rows.append(
             TradeRow(
                 projectors=pair[0],
@@ -112,17 +134,7 @@ def _traded(search: StepSearch, request: PlanRequest, clock: Stopwatch) -> _Trad
                 f"{count_words(pair[1], 'camera')}: "
                 f"{count_words(len(steps.angles), 'step')}, at least {least}"
             )
-    if not found:
-        raise InfeasibleLimitsError(
-            f"no {count_words(lamps, 'projector')} and {count_words(eyes, 'camera')} "
-            f"measure enough of the part at {most} angles of the table; allow more "
-            f"devices or steps, or another axis"
-        )
-    if wishes.max_cameras is None:
-        taken = next(iter(found))
-    else:
-        taken = min(found, key=lambda pair: (len(found[pair].angles), sum(pair)))
-    return _Traded(tuple(rows), taken, found[taken], most)
+        yield _Traded(tuple(rows), dict(found))
 
 
 def _asking_more(scene: Scene, spare: float) -> Scene:
@@ -167,7 +179,7 @@ def _placed(
     record = StationsRecord(
         kind="turntable",
         stations=(),
-        count=_count(search, traded, steps),
+        count=_count(search, steps),
         point_m=lattice.table.point_m,
         axis=lattice.table.axis,
         steps=traded.rows,
@@ -211,15 +223,15 @@ def _everything(lattice: TableLattice) -> PlacedHead:
     )
 
 
-def _count(search: StepSearch, traded: _Traded, steps: Steps) -> StationCount:
+def _count(search: StepSearch, steps: Steps) -> StationCount:
     asked, n = search.cover.asked, len(steps.angles)
     return StationCount(
         count=n,
         needed=n,
-        lower_bound=traded.steps.lower_bound,
+        lower_bound=steps.lower_bound,
         n_candidates=search.sets.lattice.n_places,
         n_samples=len(search.sets.target),
         lit=asked[0],
         measured=asked[1],
-        proof=traded.steps.proof,
+        proof=steps.proof,
     )

@@ -6,8 +6,8 @@ from planning.cameras.camera_cover import camera_candidate_views
 from planning.cameras.photogrammetry.view_bound import bound_views
 from planning.cameras.photogrammetry.view_stage import place_views
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.plan import InterruptedPlanError, RigPlan
-from planning.model.progress import TIME_IS_UP, Stopwatch
+from planning.model.plan import RigPlan
+from planning.model.progress import Stopwatch
 from planning.proofs import camera_bound
 from planning.proofs.candidate_certificate import larger
 from planning.report.advice.standing_inside import standing_inside
@@ -15,49 +15,35 @@ from planning.report.advice.what_helps import falls_short
 from planning.report.partial_plan import PlanRequest
 from planning.report.region_claims import below_floor
 from planning.rig.devices.lens_fit import check_fields
+from planning.steps.best_kept import Keep, Search, best_kept
 from planning.steps.prepare import prepared
 
 from .view_document import ViewPlan, write_view_plan
 
 
 def planned_alone(
-    request: PlanRequest, clock: Stopwatch, _keep: object
+    request: PlanRequest, clock: Stopwatch, keep: Keep | None
 ) -> tuple[RigPlan, None]:
-    """Return what `plan_alone` does, and no partial plan: rings may not help it."""
-    return plan_alone(request, clock), None
-
-
-def plan_alone(request: PlanRequest, clock: Stopwatch) -> RigPlan:
-    """Return the fewest cameras found whose pairs measure what is required.
-
-    One camera more where fresh samples fall short.
+    """Return the plan of cameras alone, and no partial plan: rings may not help it.
 
     Raises:
         InfeasibleLimitsError: If no pair of cameras measures anything.
         InterruptedPlanError: If planning is interrupted; it carries the best plan.
         TimeLimitError: If the time limit came before any plan was written.
     """
+    plan, _ = best_kept(_cameras_sought(request, clock), write_view_plan, clock, keep)
+    return plan, None
+
+
+def _cameras_sought(request: PlanRequest, clock: Stopwatch) -> Search[ViewPlan]:
+    """The fewest cameras whose pairs measure enough; one more where samples ask."""
     partial = _first_cameras(request, clock)
-    plan = None
-    try:
-        if clock.limited:
-            plan = write_view_plan(replace(partial, truncated=True), clock)
-        partial = _bounded(partial, clock)
-        while True:
-            plan = write_view_plan(partial, clock)
-            more = _one_camera_more(partial, plan, clock)
-            if more is None:
-                return plan
-            partial = more
-    except KeyboardInterrupt:
-        clock.lift()
-        cut = replace(partial, truncated=True)
-        raise InterruptedPlanError(write_view_plan(cut, clock)) from None
-    except TIME_IS_UP:
-        clock.extend()
-        if plan is None:
-            raise
-        return RigPlan(plan.document.changed(truncated=True), plan.surface)
+    yield partial, False
+    larger: ViewPlan | None = _bounded(partial, clock)
+    while larger is not None:
+        plan = yield larger, True
+        assert plan is not None
+        larger = _one_camera_more(larger, plan, clock)
 
 
 def _first_cameras(request: PlanRequest, clock: Stopwatch) -> ViewPlan:
