@@ -113,7 +113,7 @@ def _placed(
     asked = found.cover.asked
     count = StationCount(
         count=len(heads),
-        needed=max(found.needed, len(heads)) if found.met else found.needed,
+        needed=found.needed,
         lower_bound=found.lower_bound,
         n_candidates=len(found.heads),
         n_samples=len(found.cover.sets.target),

@@ -31,7 +31,8 @@ class StationCount(Part):
 
     Attributes:
         count: Stations of the plan.
-        needed: So many are enough for the candidates' samples, allowed or not.
+        needed: So many are enough for the candidates' samples, allowed or not; fresh
+            samples may ask for more.
         lower_bound: Proven least number over the candidates.
         n_candidates: Of which they are chosen.
         n_samples: Frozen samples behind both.

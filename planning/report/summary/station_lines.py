@@ -35,7 +35,10 @@ def fewest_words(plan: RigPlan) -> str:
     if count.lower_bound >= count.count:
         text = f"{found}: proved {over}"
     else:
-        text = f"{found}; at least {count.lower_bound} proved {over}"
+        more = ""
+        if count.needed < count.count:
+            more = f", of which {count.needed} suffice for the planner's own samples"
+        text = f"{found}{more}; at least {count.lower_bound} proved {over}"
     if count.everywhere is not None:
         text += f"; over every pose at least {count.everywhere}, by their light"
     return text

@@ -13,8 +13,6 @@ from .head_cover import HeadCover, HeadSets
 from .head_poses import HeadSource, PlacedHead
 
 _ROUNDS = 4
-# Of fresh samples that don't confirm a cover one in so many joins those of the next.
-_JOINING = 3
 # Of a lattice's spacing: how far around a head it is moved, round by round.
 _SCALES = (1.0, 0.5, 0.25)
 # Counted work of the cover whose bound is told, and of each other cover.
@@ -85,9 +83,7 @@ def fewest_heads(
         met = found.needed <= most
         if not met or not HeadCover.of(scene, again).lacking(found.chosen):
             break
-        some = np.arange(0, len(fresh), _JOINING)
-        part = HeadSets(fresh.take(some), again.lit[some], again.measured[some])
-        sets = sets.with_samples(part)
+        sets = sets.with_samples(again)
         found = _fewest_of(source, heads, sets, most, known)
     return found
 
