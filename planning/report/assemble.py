@@ -2,27 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from datetime import UTC, datetime
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from planning.cameras.baselines.baseline_rows import baseline_rows
-from planning.cameras.baselines.seams import SampledSurface, overlap_components
+from planning.cameras.baselines.seams import SampledSurface
 from planning.model.bodies import Obstacle
 from planning.model.document.certificates import Certificates
 from planning.model.document.device_records import BaselineRow
-from planning.model.document.input_records import (
-    EvaluationRecord,
-    RigRecord,
-    Units,
-)
-from planning.model.document.plan_document import (
-    FORMAT,
-    VERSION,
-    MemberRecord,
-    PlanDocument,
-)
+from planning.model.document.input_records import EvaluationRecord
 from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
@@ -32,7 +22,6 @@ from planning.report.advice.floor_relaxations import (
     with_small_floor,
 )
 from planning.report.advice.what_helps import with_fewer_needed, with_relaxations
-from planning.report.entries.cost_entry import cost_record
 from planning.report.entries.overlaps import overlap_records
 from planning.report.entries.range_entries import ranges_record, with_spread
 from planning.report.entries.station_entries import stations_record
@@ -44,6 +33,7 @@ from planning.scene.placed_bodies import Device
 from planning.scene.scene import Scene
 
 from .claims import Claims, make_claims
+from .document import Told, document_of
 from .entries import device_entries as entries
 from .judged import Devices
 from .marginal import marginal_records
@@ -81,67 +71,37 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
     overlaps, schedule = overlap_records(among, devices.projectors, moved=moved)
     surface = _surface(scene, devices, partial.ready)
     requirements = _final_requirements(among, claims, devices)
-    projectors = entries.projector_records(among, devices, partial.rings, claims)
-    cameras = entries.camera_records(among, devices.cameras, claims)
-    rig = RigRecord(**partial.request.rig.to_document())
-    document = PlanDocument(
-        format=FORMAT,
-        version=VERSION,
-        units=Units(length="m", angle="rad"),
-        seed=partial.request.seed,
-        created=datetime.now(UTC).isoformat(timespec="seconds"),
-        command=partial.request.command,
-        truncated=partial.truncated,
-        meshes=(entries.mesh_record(scene.mesh, scene.shell),),
-        surface=entries.surface_record(partial.ready, surface),
-        rig=rig,
-        requirements=requirements,
-        regions=regions,
-        projectors=projectors,
-        cameras=cameras,
-        ring_axes=entries.axes_record(among, partial, devices, claims),
-        coverage=coverage,
-        overlaps=overlaps,
-        firing_schedule=schedule,
-        marginal=marginal,
-        certificates=certificates,
-        baselines=_baselines(partial, devices, claims, requirements),
-        camera_groups=tuple(
-            tuple(devices.cameras[c].id for c in group)
-            for group in overlap_components(claims.measured_by)
-        ),
-        cost=cost_record(
-            rig,
-            projectors,
-            cameras,
-            n_before=certificates.cameras.greedy_count,
-            stages=clock.processor,
-        ),
-        members=(
-            MemberRecord(
-                mesh=0,
-                coverage=coverage,
-                regions=tuple(region.id for region in regions),
-                reconstruction=None,
-            ),
-        ),
-        reconstruction=None,
-        timings_s=dict(clock.seconds),
+    told = Told(
+        requirements,
+        coverage,
+        regions,
+        entries.projector_records(among, devices, partial.rings, claims),
+        entries.camera_records(among, devices.cameras, claims),
+        marginal,
+        certificates,
+        _baselines(partial, devices, claims, requirements),
     )
+    others: dict[str, Any] = {
+        "ring_axes": entries.axes_record(among, partial, devices, claims),
+        "overlaps": overlaps,
+        "firing_schedule": schedule,
+        "survival": survival,
+    }
     if stationed is not None:
-        stations = stations_record(stationed, devices)
-        document = document.changed(stations=stations)
-    if survival is not None:
-        document = document.changed(survival=survival)
+        others["stations"] = stations_record(stationed, devices)
     if partial.request.ranges is not None:
-        document = document.changed(ranges=ranges_record(*partial.request.ranges))
+        others["ranges"] = ranges_record(*partial.request.ranges)
     mounted = partial.request.mounted
     if mounted is not None and partial.request.evaluates:
         broken = violations(scene, (*devices.projectors, *devices.cameras))
-        evaluation = EvaluationRecord(
+        others["evaluation"] = EvaluationRecord(
             path=mounted.path, sha256=mounted.sha256, violations=broken
         )
-        document = document.changed(evaluation=evaluation)
+    document = document_of(
+        *(partial.ready, surface, claims, told, clock),
+        truncated=partial.truncated,
+        **others,
+    )
     return RigPlan(document, surface)
 
 

@@ -2,34 +2,26 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 
 import numpy as np
 from numpy.typing import NDArray
 
 from planning.cameras.baselines.baseline_rows import baseline_rows
-from planning.cameras.baselines.seams import SampledSurface, overlap_components
+from planning.cameras.baselines.seams import SampledSurface
 from planning.cameras.photogrammetry.best_pairs import widest_sample
 from planning.cameras.photogrammetry.measured_views import measured_views
 from planning.cameras.photogrammetry.view_stage import ViewStage
 from planning.model.bodies import Obstacle
 from planning.model.document.certificates import Certificates
 from planning.model.document.coverage_records import CameraMarginal
-from planning.model.document.input_records import RigRecord, Units
-from planning.model.document.plan_document import (
-    FORMAT,
-    VERSION,
-    MemberRecord,
-    PlanDocument,
-)
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
 from planning.model.surface import Surface
 from planning.report.claims import Claims
+from planning.report.document import Told, document_of
 from planning.report.entries import device_entries as entries
-from planning.report.entries.cost_entry import cost_record
 from planning.report.judged import Devices
 from planning.report.partial_plan import PlanRequest, Prepared
 from planning.scene.draws import DRAWS
@@ -72,60 +64,28 @@ def write_view_plan(partial: ViewPlan, clock: Stopwatch) -> RigPlan:
     with clock.stage("claims", "coverage, recomputed from the rounded poses"):
         claims = view_claims(scene, devices)
         marginal = _marginal(partial, claims)
-    surface = _surface(scene, devices)
-    rig = RigRecord(**partial.request.rig.to_document())
-    cameras = entries.camera_records(scene, devices.cameras, claims)
-    regions = entries.region_records(scene.mesh, partial.ready.regions, claims)
-    certificates = _certificates(partial)
     samples = claims.target_samples.samples
-    document = PlanDocument(
-        format=FORMAT,
-        version=VERSION,
-        units=Units(length="m", angle="rad"),
-        seed=partial.request.seed,
-        created=datetime.now(UTC).isoformat(timespec="seconds"),
-        command=partial.request.command,
+    baselines = baseline_rows(
+        devices.cameras,
+        SampledSurface(samples.points, samples.normals),
+        claims.measured_by,
+        scene.requirements.camera.max_incidence,
+    )
+    told = Told(
+        _final_requirements(scene, claims, devices),
+        claims.coverage,
+        entries.region_records(scene.mesh, partial.ready.regions, claims),
+        (),
+        entries.camera_records(scene, devices.cameras, claims),
+        marginal,
+        _certificates(partial),
+        tuple(baselines),
+    )
+    surface = _surface(scene, devices)
+    document = document_of(
+        *(partial.ready, surface, claims, told, clock),
         truncated=partial.truncated,
-        meshes=(entries.mesh_record(scene.mesh, scene.shell),),
-        surface=entries.surface_record(partial.ready, surface),
-        rig=rig,
-        requirements=_final_requirements(scene, claims, devices),
-        regions=regions,
-        projectors=(),
-        cameras=cameras,
-        coverage=claims.coverage,
-        marginal=marginal,
-        certificates=certificates,
-        baselines=tuple(
-            baseline_rows(
-                devices.cameras,
-                SampledSurface(samples.points, samples.normals),
-                claims.measured_by,
-                scene.requirements.camera.max_incidence,
-            )
-        ),
-        camera_groups=tuple(
-            tuple(devices.cameras[c].id for c in group)
-            for group in overlap_components(claims.measured_by)
-        ),
-        cost=cost_record(
-            rig,
-            (),
-            cameras,
-            n_before=certificates.cameras.greedy_count,
-            stages=clock.processor,
-        ),
-        members=(
-            MemberRecord(
-                mesh=0,
-                coverage=claims.coverage,
-                regions=tuple(region.id for region in regions),
-                reconstruction=None,
-            ),
-        ),
         assumed=ASSUMED,
-        reconstruction=None,
-        timings_s=dict(clock.seconds),
     )
     return RigPlan(document, surface)
 

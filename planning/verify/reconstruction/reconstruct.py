@@ -3,14 +3,9 @@
 from dataclasses import dataclass, replace
 from functools import partial
 
-from geometry.mesh.sampling import sample_surface
 from geometry.parallel import n_threads
-from planning.verify.reconstruction.check.accuracy import (
-    Expected,
-    held_against,
-    measure_completeness,
-    share_of,
-)
+from planning.verify.reconstruction.check.accuracy import Completeness, Expected
+from planning.verify.reconstruction.check.judged import fresh_samples, judged
 from planning.verify.reconstruction.check.merge import Merged, merge
 from planning.verify.reconstruction.check.overlaps import ring_pitch_px
 from planning.verify.reconstruction.check.result import PairCount, Reconstruction
@@ -37,8 +32,6 @@ from planning.verify.reconstruction.render.rendered import (
 
 from .cloud import Cloud
 from .scanner import Scanner
-
-_DEFAULT_SAMPLES = 20_000
 
 
 def reconstruct(
@@ -121,7 +114,7 @@ def reconstruct_twice(
     threads = threads or n_threads()
     light, stands = photometry or assumed_light(plan), mounted or plan
     if expected is None:
-        expected = _fresh(plan, seed)
+        expected = fresh_samples(plan, seed)
 
     def measure(design: Scanner, turn: int) -> tuple[Pairs, Reconstruction]:
         spent, rig = Spent(), _ringed(stands, design)
@@ -160,7 +153,7 @@ def reconstruct_twice(
             [numbered(first.merged.cloud, before), numbered(again.merged.cloud, after)]
         ),
     )
-    both = _judged(rig, pairs, merged, expected.within(plan.target), light, Spent())
+    both = _judged(rig, pairs, merged, expected, light, Spent())
     return BothSequences(first, second, both)
 
 
@@ -184,7 +177,7 @@ def conclude(
 
     Without photometry the images were taken. The time of merging is added to `spent`.
     """
-    expected = expected or _fresh(plan, seed)
+    expected = expected or fresh_samples(plan, seed)
     spent = spent or Spent()
     with spent.on("decode"):
         decoded = with_camera_pairs(plan, decoded)
@@ -192,14 +185,7 @@ def conclude(
     with spent.on("merge"):
         lit = {pair: gave.lit for pair, gave in decoded}
         merged = merge(everything, plan, lit, pitch_px=ring_pitch_px(everything, plan))
-    within = expected.within(plan.target)
-    return _judged(plan, decoded, merged, within, photometry, spent)
-
-
-def _fresh(plan: Scanner, seed: int) -> Expected:
-    """Points of the target that nobody says anything of."""
-    mesh, target = plan.mesh, plan.target
-    return Expected(sample_surface(mesh, _DEFAULT_SAMPLES, seed=seed, within=target))
+    return _judged(plan, decoded, merged, expected, photometry, spent)
 
 
 def _everything(decoded: Pairs) -> Cloud:
@@ -234,26 +220,20 @@ def _judged(
     spent: Spent,
 ) -> Reconstruction:
     """Hold what was merged against the object and the limits, and seek causes."""
-    limits, everything = plan.limits.check, _everything(decoded)
-    completeness = measure_completeness(
-        everything, merged.cloud, expected, limits.tau_m
-    )
+    everything = _everything(decoded)
     pairs = tuple(PairCount.of(plan, pair, gave) for pair, gave in decoded)
-    nothing = f"no point was measured: {rejection(pairs) or 'nothing was decoded'}"
-    accuracy, failures, inside = held_against(merged.cloud, plan, completeness, nothing)
-    if accuracy is not None and failures:
+
+    def causes(failures: tuple[str, ...], found: Completeness) -> tuple[str, ...]:
+        within = expected.within(plan.target)
         measured = MeasuredClouds(
-            plan, decoded, pairs, everything, expected, completeness.missing
+            plan, decoded, pairs, everything, within, found.missing
         )
-        failures = explained(failures, measured)
-    return Reconstruction(
-        everything,
-        merged,
-        accuracy,
-        completeness,
-        pairs,
-        photometry,
-        failures,
-        spent.seconds,
-        inside_fraction=share_of(inside),
+        return explained(failures, measured)
+
+    return judged(
+        *(plan, everything, merged, pairs, expected),
+        photometry=photometry,
+        spent=spent,
+        nothing=f"no point was measured: {rejection(pairs) or 'nothing was decoded'}",
+        explain=causes,
     )

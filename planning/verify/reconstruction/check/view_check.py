@@ -5,7 +5,6 @@ from itertools import combinations
 
 import numpy as np
 
-from geometry.mesh.sampling import sample_surface
 from geometry.parallel import abandonable, n_threads
 from geometry.rays.rays import RayCaster
 from planning.verify.reconstruction.arrays import Array, Mask
@@ -25,18 +24,13 @@ from planning.verify.reconstruction.render.textured import (
 )
 from planning.verify.reconstruction.scanner import Scanner
 
-from .accuracy import (
-    Expected,
-    held_against,
-    measure_completeness,
-    share_of,
-)
+from .accuracy import Expected, share_of
 from .calibration_sigma import calibration_sigma
 from .dense_merge import merge_dense
+from .judged import fresh_samples, judged
 from .merge import Merged
 from .result import PairCount, Reconstruction
 
-_DEFAULT_SAMPLES = 20_000
 # Of the ball that holds the object so many places are looked at, and pairs are matched
 # whose rays meet within the limits at this share of those that both see.
 _PLACES, _LEAST_SHARE = 500, 0.05
@@ -97,7 +91,12 @@ def reconstruct_views(
     with spent.on("merge"):
         merged = merge_views(everything, plan)
     counts = tuple(_count(plan, pair, gave) for pair, gave in found)
-    return _judged(plan, everything, merged, counts, light, spent, expected, seed)
+    return judged(
+        *(plan, everything, merged, counts, expected or fresh_samples(plan, seed)),
+        photometry=light,
+        spent=spent,
+        nothing="no point was measured: no images matched",
+    )
 
 
 def matched_pairs(plan: Scanner, ball: Ball) -> list[_Pair]:
@@ -194,38 +193,3 @@ def _count(plan: Scanner, pair: _Pair, gave: MatchedViews) -> PairCount:
     one, other = (plan.cameras[c].id for c in pair)
     n = gave.n_asked
     return PairCount(other, one, n, n, len(gave.cloud), gave.rejected)
-
-
-def _judged(
-    plan: Scanner,
-    everything: Cloud,
-    merged: Merged,
-    pairs: tuple[PairCount, ...],
-    photometry: Photometry,
-    spent: Spent,
-    expected: Expected | None,
-    seed: int,
-) -> Reconstruction:
-    """Hold what was merged against the object and the limits."""
-    limits = plan.limits.check
-    if expected is None:
-        samples = sample_surface(
-            plan.mesh, _DEFAULT_SAMPLES, seed=seed, within=plan.target
-        )
-        expected = Expected(samples)
-    completeness = measure_completeness(
-        everything, merged.cloud, expected.within(plan.target), limits.tau_m
-    )
-    nothing = "no point was measured: no images matched"
-    accuracy, failures, inside = held_against(merged.cloud, plan, completeness, nothing)
-    return Reconstruction(
-        everything,
-        merged,
-        accuracy,
-        completeness,
-        pairs,
-        photometry,
-        failures,
-        spent.seconds,
-        inside_fraction=share_of(inside),
-    )
