@@ -1,9 +1,13 @@
 """Rigs whose devices stand together, or before a table: what can be asked of them."""
 
+from planning.cameras.stations.turntable.table_lattice import planned_angles
 from planning.model.errors import InputError
 from planning.report.partial_plan import PlanRequest
 from planning.rig.rig import Rig
 from planning.rig.wishes import Pattern
+
+# Angles of a turntable that are planned with, at most.
+_MOST_ANGLES = 96
 
 
 def pattern_of_rig(rig: Rig, asked: Pattern | None) -> Pattern:
@@ -55,6 +59,12 @@ def check_carried(request: PlanRequest) -> None:
             f"{named}, which is planned with pattern 'dense', not {wishes.pattern!r}"
         )
     table, bodies = rig.turntable, ("projector", "camera")
+    if table is not None and planned_angles(table.steps) > _MOST_ANGLES:
+        raise InputError(
+            f"{named} of {table.steps} steps, of which none from 12 to 36 evenly over "
+            f"a turn can be planned with; give a number that one of these divides, or "
+            f'steps = "free"'
+        )
     models = [model for kind in bodies for model in rig.models(kind)]
     housed = any(model.body for model in models)
     fastened = any(model.table.mount for model in models)

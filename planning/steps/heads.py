@@ -53,11 +53,13 @@ def heads_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
     while True:
         plan = yield partial, True
         assert plan is not None
-        count = len(found.chosen)
-        if not any(short_of(plan)) or found.needed > most or count >= most:
+        if not any(short_of(plan)) or len(found.chosen) >= most:
             return
-        clock.say(f"  fresh samples fall short: {count_words(count + 1, 'head')}")
-        found = found.with_one_more(ready.scene)
+        more = found.with_one_more(source)
+        if more is None:
+            return
+        found, count = more, len(more.chosen)
+        clock.say(f"  fresh samples fall short: {count_words(count, 'head')}")
         partial = _placed(ready, head, found, everywhere, clock)
 
 

@@ -13,7 +13,11 @@ from planning.cameras.stations.turntable.fewest_steps import (
     StepSearch,
     pairs_of_counts,
 )
-from planning.cameras.stations.turntable.table_lattice import TableLattice, about_axis
+from planning.cameras.stations.turntable.table_lattice import (
+    TableLattice,
+    about_axis,
+    off_axis_m,
+)
 from planning.cameras.stations.turntable.table_sets import TableSets
 from planning.model.device_poses import moved_to
 from planning.model.document.station_records import (
@@ -67,25 +71,20 @@ def steps_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
     with clock.stage("turntable", "turntable: what pairs measure at every angle"):
         sets = TableSets.of(scene, lattice, scene.target_samples(DRAWS.cameras))
     search = StepSearch.of(scene, sets)
-    most = table.max_steps or lattice.n_places
+    most = min(table.max_steps or lattice.n_angles, lattice.n_angles)
     partial, traded = None, _Traded((), {})
     for traded in _trades(search, request, most, clock):
         if partial is None and traded.found:
             taken = next(iter(traded.found))
-            partial = _placed(ready, search, traded, traded.found[taken], clock)
+            partial = _placed(ready, search, traded, taken, clock)
             yield partial, False
     if partial is None:
-        lamps, eyes = _counts(request)
-        raise InfeasibleLimitsError(
-            f"no {count_words(lamps, 'projector')} and {count_words(eyes, 'camera')} "
-            f"measure enough of the part at {most} angles of the table; allow more "
-            f"devices or steps, or another axis"
-        )
+        raise InfeasibleLimitsError(_too_little(request, traded, lattice, most))
     found = traded.found
     taken = next(iter(found))
     if request.wishes.max_cameras is not None:
         taken = min(found, key=lambda pair: (len(found[pair].angles), sum(pair)))
-    partial = _placed(ready, search, traded, found[taken], clock)
+    partial = _placed(ready, search, traded, taken, clock)
     plan = yield partial, True
     for spare in _SPARE:
         assert plan is not None
@@ -95,10 +94,27 @@ def steps_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
         asked = StepSearch.of(_asking_more(scene, spare), sets)
         steps, _ = asked.fewest(*taken, most)
         if steps is not None:
-            proved = found[taken]
-            bounded = replace(steps, lower_bound=proved.lower_bound, proof=proved.proof)
-            partial = _placed(ready, search, traded, bounded, clock)
+            partial = _placed(ready, search, traded, taken, clock, steps)
             plan = yield partial, True
+
+
+def _too_little(
+    request: PlanRequest, traded: _Traded, lattice: TableLattice, most: int
+) -> str:
+    """Say that the devices allowed don't do, how far that is known, and what may."""
+    lamps, eyes = _counts(request)
+    devices = f"{count_words(lamps, 'projector')} and {count_words(eyes, 'camera')}"
+    angles = count_words(most, "angle")
+    refuted = all(row.lower_bound > most for row in traded.rows)
+    beside = off_axis_m(lattice.table, lattice.space)
+    far = ""
+    if beside > lattice.space.object_radius_m:
+        far = f"; the axis runs {1e3 * beside:.0f} mm beside the middle of the part"
+    if refuted:
+        said = f"{devices} measure too little of the part at {angles} of the table"
+    else:
+        said = f"no places of {devices} were found that measure enough at {angles}"
+    return f"{said}{far}; allow more devices or steps, or another axis"
 
 
 def _counts(request: PlanRequest) -> tuple[int, int]:
@@ -151,10 +167,16 @@ def _placed(
     ready: Prepared,
     search: StepSearch,
     traded: _Traded,
-    steps: Steps,
+    taken: tuple[int, int],
     clock: Stopwatch,
+    steps: Steps | None = None,
 ) -> PartialPlan:
-    """The devices at every step, as the part sees them."""
+    """The devices at every step, as the part sees them.
+
+    Steps are those found to be the fewest for the devices taken, or others.
+    """
+    needed = traded.found[taken]
+    steps = steps or needed
     lattice = search.sets.lattice
     room = _room(lattice, steps)
     planned: list[PlacedHead] = []
@@ -179,7 +201,7 @@ def _placed(
     record = StationsRecord(
         kind="turntable",
         stations=(),
-        count=_count(search, steps),
+        count=_count(search, steps, needed),
         point_m=lattice.table.point_m,
         axis=lattice.table.axis,
         steps=traded.rows,
@@ -223,15 +245,15 @@ def _everything(lattice: TableLattice) -> PlacedHead:
     )
 
 
-def _count(search: StepSearch, steps: Steps) -> StationCount:
+def _count(search: StepSearch, steps: Steps, needed: Steps) -> StationCount:
     asked, n = search.cover.asked, len(steps.angles)
     return StationCount(
         count=n,
-        needed=n,
-        lower_bound=steps.lower_bound,
+        needed=len(needed.angles),
+        lower_bound=needed.lower_bound,
         n_candidates=search.sets.lattice.n_places,
         n_samples=len(search.sets.target),
         lit=asked[0],
         measured=asked[1],
-        proof=steps.proof,
+        proof=needed.proof,
     )

@@ -22,15 +22,16 @@ class _Lattice:
     offsets = np.array([-1, 0, 1])
     projectors = cameras = (None,) * CIRCLES
 
-    def __init__(self, room=None):
+    def __init__(self, room=None, stride=1):
         self.room = np.ones(ANGLES, dtype=bool) if room is None else room
+        self.stride, self.n_angles = stride, ANGLES // stride
 
     def begins(self, devices):
         free = [np.roll(self.room, -place) for _, place in devices]
         return np.flatnonzero(np.all(free, axis=0))
 
 
-def _search(seed, *, room=None, coverage=0.8):
+def _search(seed, *, room=None, coverage=0.8, stride=1):
     rng = np.random.default_rng(seed)
     lit = rng.random((CIRCLES, ANGLES, N)) < 0.5
     measured = rng.random((CIRCLES, ANGLES, CIRCLES, 3, N)) < 0.6
@@ -41,7 +42,9 @@ def _search(seed, *, room=None, coverage=0.8):
         dominant_coverage=0.6, coverage=coverage, region_coverage=0.0
     )
     scene = SimpleNamespace(requirements=required, seed=0, check_cancelled=lambda: None)
-    return StepSearch.of(scene, TableSets(_Lattice(room), target, lit, measured))
+    return StepSearch.of(
+        scene, TableSets(_Lattice(room, stride), target, lit, measured)
+    )
 
 
 def _enough(search, lamps, eyes, angles):
@@ -60,14 +63,15 @@ def _enough(search, lamps, eyes, angles):
 
 def _brute(search, n_lamps, n_eyes):
     """The fewest angles over all places of all devices; None: never enough."""
-    places = list(product(range(CIRCLES), range(ANGLES)))
-    for count in range(1, ANGLES + 1):
+    places, lattice = list(product(range(CIRCLES), range(ANGLES))), search.sets.lattice
+    every = range(0, ANGLES, lattice.stride)
+    for count in range(1, lattice.n_angles + 1):
         for lamps in combinations(places, n_lamps):
             for eyes in combinations(places, n_eyes):
                 devices = [(None, place) for _, place in (*lamps, *eyes)]
-                if not len(search.sets.lattice.begins(devices)):
+                if 0 not in lattice.begins(devices):
                     continue
-                for angles in combinations(range(ANGLES), count):
+                for angles in combinations(every, count):
                     if _enough(search, lamps, eyes, angles):
                         return count
     return None
@@ -86,6 +90,37 @@ def test_the_fewest_steps_are_those_of_all_choices(seed, n_lamps, n_eyes):
     assert len(steps.angles) == truth == least == steps.lower_bound
     assert (len(steps.lamps), len(steps.eyes)) == (n_lamps, n_eyes)
     assert _enough(search, steps.lamps, steps.eyes, steps.angles)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("n_eyes", [1, 2])
+@pytest.mark.parametrize("stride", [2, 3])
+def test_devices_may_stand_between_the_angles_of_a_table(seed, n_eyes, stride):
+    room = np.array([True, True, True, True, False, True])
+    search = _search(seed, room=room, coverage=0.6, stride=stride)
+    steps, least = search.fewest(1, n_eyes, ANGLES)
+    truth = _brute(search, 1, n_eyes)
+    if truth is None:
+        assert steps is None
+        assert least > ANGLES // stride
+        return
+    assert len(steps.angles) == truth == least
+    assert not (steps.angles % stride).any()
+    assert all(room[place] for _, place in (*steps.lamps, *steps.eyes))
+    assert _enough(search, steps.lamps, steps.eyes, steps.angles)
+
+
+def test_a_cut_search_finds_steps_and_claims_no_more_than_it_proved(monkeypatch):
+    """As good as nothing is looked at; what is found is enough, and no bound false."""
+    module = "planning.cameras.stations.turntable.fewest_steps"
+    monkeypatch.setattr(f"{module}._ALL", 1)
+    for seed in range(4):
+        search = _search(seed)
+        steps, least = search.fewest(1, 2, ANGLES)
+        truth = _brute(search, 1, 2)
+        assert least <= truth <= len(steps.angles)
+        assert steps.lower_bound == least
+        assert _enough(search, steps.lamps, steps.eyes, steps.angles)
 
 
 def test_devices_stand_where_the_room_lets_them():

@@ -32,7 +32,8 @@ class StationCount(Part):
     Attributes:
         count: Stations of the plan.
         needed: So many are enough for the candidates' samples, allowed or not; fresh
-            samples may ask for more.
+            samples may ask for more. None: no heads were found that are enough and
+            whose housings keep off each other.
         lower_bound: Proven least number over the candidates.
         n_candidates: Of which they are chosen.
         n_samples: Frozen samples behind both.
@@ -44,7 +45,7 @@ class StationCount(Part):
     """
 
     count: int
-    needed: int
+    needed: int | None
     lower_bound: int
     n_candidates: int
     n_samples: int

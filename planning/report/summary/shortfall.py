@@ -281,8 +281,11 @@ def _remedies(kind: str, document: PlanDocument, share: float) -> tuple[str, ...
         of_any = f"with any number of each {needed.count} would do"
         return (f"more of {gone} in stock: {of_any}", f"or {accept}")
     told = document.stations
-    if told is not None and told.count and told.count.needed > told.count.count:
-        return f"--max-heads {told.count.needed} would do", f"or {accept}"
+    count = None if told is None else told.count
+    if count is not None and count.needed is None:
+        return "smaller housings, or less clearance_mm, would help", f"or {accept}"
+    if count is not None and (count.needed or 0) > count.count:
+        return f"--max-heads {count.needed} would do", f"or {accept}"
     # Where bodies are in the way, more devices may be no help.
     in_vain = needed.count <= proof.but_for_bodies
     if allowed is None or needed.count <= allowed or in_vain:

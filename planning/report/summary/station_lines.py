@@ -26,6 +26,11 @@ def fewest_words(plan: RigPlan) -> str:
         return ""
     count, word = told.count, _WORDS[told.kind]
     over = f"over {count.n_candidates} candidates"
+    if count.needed is None:
+        return (
+            f"at least {count.lower_bound} {word}s proved {over}; none were found that "
+            f"are enough and whose housings keep off each other"
+        )
     if count.needed > count.count:
         return (
             f"at least {count.lower_bound} {word}s proved {over}, {count.needed} "

@@ -1,12 +1,12 @@
 """The search for the fewest heads, until samples that are fresh confirm them."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from geometry.arrays import Ints
+from geometry.arrays import Ints, Mask
 from planning.scene.draws import DRAWS
-from planning.scene.scene import Scene
 from solvers import solve_cover, solve_max_coverage
 
 from .head_cover import HeadCover, HeadSets
@@ -16,9 +16,12 @@ _ROUNDS = 4
 # Of a lattice's spacing: how far around a head it is moved, round by round.
 _SCALES = (1.0, 0.5, 0.25)
 # Counted work of the cover whose bound is told, and of each other cover.
-_PROOF_BUDGET, _BUDGET = 1e9, 5e7
+_PROOF_BUDGET, _BUDGET = 4e9, 5e7
 # Of what is asked, at most that a head less is lacking before it is moved together.
 _NEARLY = 0.06
+# Times that one of two heads that collide is left out and the others are sought anew.
+_EXCHANGES = 30
+_NONE: Ints = np.empty(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +32,8 @@ class FoundHeads:
         heads: All candidates.
         cover: What is asked of them.
         chosen: Those taken, at most as many as are allowed, (k,).
-        needed: So many are enough, allowed or not.
+        needed: So many are enough, allowed or not; None: none were found that are and
+            whose housings keep off each other.
         lower_bound: Proven least number of the candidates.
         proof: What proves it.
         greedy: As many a greedy choice takes; None: it never gets there.
@@ -38,23 +42,30 @@ class FoundHeads:
     heads: tuple[PlacedHead, ...]
     cover: HeadCover
     chosen: Ints
-    needed: int
+    needed: int | None
     lower_bound: int
     proof: str
     greedy: int | None
 
-    @property
-    def met(self) -> bool:
-        """Whether those taken are enough for the samples."""
-        return self.cover.lacking(self.chosen) == 0
+    def with_one_more(self, source: HeadSource) -> "FoundHeads | None":
+        """Return one head more: the best of so many, or that which adds most.
 
-    def with_one_more(self, scene: Scene) -> "FoundHeads":
-        """Return one head more: the best of so many, or that which adds most."""
+        None: no other head adds anything and has room.
+        """
         count, problem = len(self.chosen) + 1, self.cover.problem
         more = solve_max_coverage(
-            *(problem, count), warm_start=self.chosen, seed=scene.seed, budget=_BUDGET
-        )
-        return replace(self, chosen=more.selected)
+            *(problem, count),
+            warm_start=self.chosen,
+            seed=source.scene.seed,
+            budget=_BUDGET,
+        ).selected
+        if source.colliding([self.heads[k] for k in more]) is not None:
+            more = self.chosen
+        if len(more) <= len(self.chosen):
+            more = _apart(source, self.heads, self.cover, count, self.chosen)
+        if len(more) <= len(self.chosen):
+            return None
+        return replace(self, chosen=more)
 
     @property
     def taken(self) -> tuple[PlacedHead, ...]:
@@ -80,7 +91,7 @@ def fewest_heads(
     for draw in range(_ROUNDS):
         fresh = scene.target_samples(DRAWS.fresh_cameras.later(1 + draw))
         again = HeadSets.of(scene, heads, fresh)
-        met = found.needed <= most
+        met = found.needed is not None and found.needed <= most
         if not met or not HeadCover.of(scene, again).lacking(found.chosen):
             break
         sets = sets.with_samples(again)
@@ -121,29 +132,68 @@ def _fewest_of(
 ) -> FoundHeads:
     """Return the fewest of some heads whose housings don't collide.
 
-    Of two that do, the one that measures less isn't offered again; the bound is of any.
-    Those known may be fewer than the search finds.
+    The bound is of any, colliding or not. Those known may be fewer than the search
+    finds.
     """
     cover, seed = HeadCover.of(source.scene, sets), source.scene.seed
     first = solve_cover(cover.problem, seed=seed, budget=_PROOF_BUDGET)
-    solution = first
-    while True:
-        chosen = solution.selected
-        if len(known) and len(known) < len(chosen) and not cover.lacking(known):
-            chosen = known
-        needed = len(chosen)
-        if needed > most:
-            few = solve_max_coverage(cover.problem, most, seed=seed, budget=_BUDGET)
-            chosen = few.selected
+    chosen = first.selected
+    if len(known) and len(known) < len(chosen) and not cover.lacking(known):
+        chosen = known
+    if source.colliding([heads[k] for k in chosen]) is not None:
+        chosen = _fewest_apart(source, heads, cover, chosen)
+    bound = int(np.ceil(first.lower_bound - 1e-9))
+    needed = None if cover.lacking(chosen) else len(chosen)
+    if needed is None or needed > most:
+        few = solve_max_coverage(cover.problem, most, seed=seed, budget=_BUDGET)
+        chosen = few.selected
+        if source.colliding([heads[k] for k in chosen]) is not None:
+            chosen = _apart(source, heads, cover, most)
+    whole, met = _greedy(cover)
+    greedy = len(whole) if met else None
+    return FoundHeads(heads, cover, chosen, needed, bound, first.proof, greedy)
+
+
+def _fewest_apart(
+    source: HeadSource, heads: tuple[PlacedHead, ...], cover: HeadCover, chosen: Ints
+) -> Ints:
+    """Return the fewest heads found that are enough and don't collide, or the most.
+
+    Of two that do, the one that measures less isn't offered again, so many times; then
+    each is taken that adds most beside the others.
+    """
+    measured, left = cover.sets.measured.sum(axis=0), cover
+    for _ in range(_EXCHANGES):
+        source.scene.check_cancelled()
         pair = source.colliding([heads[k] for k in chosen])
         if pair is None:
+            return chosen
+        worse = min((int(chosen[k]) for k in pair), key=lambda k: (measured[k], k))
+        left = left.without(worse)
+        solution = solve_cover(left.problem, seed=source.scene.seed, budget=_BUDGET)
+        if left.lacking(solution.selected):
             break
-        measured = sets.measured[:, chosen].sum(axis=0)
-        worse = chosen[min(pair, key=lambda k: (measured[k], k))]
-        cover = cover.without(int(worse))
-        solution = solve_cover(cover.problem, seed=seed, budget=_BUDGET)
-    bound = min(needed, int(np.ceil(first.lower_bound - 1e-9)))
-    return FoundHeads(heads, cover, chosen, needed, bound, first.proof, _greedy(cover))
+        chosen = solution.selected
+    return _apart(source, heads, cover, len(heads))
+
+
+def _apart(
+    source: HeadSource,
+    heads: tuple[PlacedHead, ...],
+    cover: HeadCover,
+    most: int,
+    begin: Ints = _NONE,
+) -> Ints:
+    """Return heads, at most so many, each that adds most and has room beside others."""
+    free = np.ones(len(heads), dtype=bool)
+
+    def clear(taken: int) -> Mask:
+        for k in np.flatnonzero(free):
+            free[k] = source.colliding([heads[taken], heads[k]]) is None
+        free[taken] = False
+        return free
+
+    return _greedy(cover, most, begin, clear)[0]
 
 
 def _moved_together(
@@ -204,19 +254,34 @@ def _lacking_with_each(cover: HeadCover, others: HeadSets, offered: HeadSets) ->
     return np.clip(floors - counts, 0, None).sum(axis=1).astype(np.int64)
 
 
-def _greedy(cover: HeadCover) -> int | None:
-    """Return how many heads are taken, each that adds most to what is lacking."""
+def _greedy(
+    cover: HeadCover,
+    most: int | None = None,
+    begin: Ints = _NONE,
+    clear: Callable[[int], Mask] | None = None,
+) -> tuple[Ints, bool]:
+    """Return heads, each that adds most to what is lacking, and whether all is served.
+
+    `clear` says of a head that is taken which others may be taken yet.
+    """
     rows, floors = cover.quotas.regions.row, cover.quotas.floors.astype(np.int64)
     covers, served = cover.covers, np.zeros(len(cover.rows), dtype=bool)
-    count = 0
+    chosen, free = list[int](), np.ones(covers.shape[1], dtype=bool)
+    begun = begin.tolist()
     while True:
         have = np.bincount(rows[served], minlength=len(floors))
         short = floors - have
-        if not (short > 0).any():
-            return count
-        wanted = ~served & (short > 0)[rows]
-        gains = covers[wanted].sum(axis=0)
-        if not gains.any():
-            return None
-        served |= covers[:, int(np.argmax(gains))]
-        count += 1
+        if begun:
+            best = begun.pop(0)
+        elif not (short > 0).any() or len(chosen) == most:
+            return np.sort(np.array(chosen, dtype=np.int64)), not (short > 0).any()
+        else:
+            wanted = ~served & (short > 0)[rows]
+            gains = np.where(free, covers[wanted].sum(axis=0), 0)
+            if not gains.any():
+                return np.sort(np.array(chosen, dtype=np.int64)), False
+            best = int(np.argmax(gains))
+        chosen.append(best)
+        served |= covers[:, best]
+        if clear is not None:
+            free &= clear(best)

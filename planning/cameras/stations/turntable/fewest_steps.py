@@ -11,11 +11,10 @@ with whom::
     steps >= ceil(K / P),  K the fewest pairs of place and angle that any cameras serve
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations, combinations_with_replacement, product
-from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +29,10 @@ from .table_sets import Place, TableSets
 
 _BUDGET = 2e8
 # Sets of angles at most that are looked at, for all places of as many projectors, and
-# of which cameras are tried; of more the number isn't proved.
+# of which cameras are tried; of more the number isn't proved. After some, steps that
+# are enough are looked for in another way, with the first of the projectors.
 _ALL, _TRIED = 20_000_000, 4000
+_SOON, _FIRST = 1_000_000, 4
 _AT_ONCE = 20_000
 _SEARCHED = "every choice of places and angles"
 _SERVED = "what any cameras serve at a step"
@@ -86,6 +87,15 @@ class _Circle:
         )
 
 
+@dataclass
+class _Spent:
+    """Sets of angles looked at, and tried with cameras; whether it ended there."""
+
+    looked: int = 0
+    tried: int = 0
+    cut: bool = False
+
+
 @dataclass(frozen=True, eq=False)
 class StepSearch:
     """Looks for the fewest steps of a lattice's places.
@@ -108,18 +118,82 @@ class StepSearch:
     def fewest(self, n_lamps: int, n_eyes: int, most: int) -> tuple[Steps | None, int]:
         """Return the fewest steps for so many devices, and what is proved of them.
 
-        None: at most so many steps weren't found to be enough.
+        None: at most so many steps weren't found to be enough; are they refuted, the
+        bound is above them.
         """
+        most, kept = min(most, self.sets.lattice.n_angles), self._kept(n_lamps, n_eyes)
+        if not kept and n_lamps <= 2:
+            return None, most + 1
         least, refuted = self._least(n_lamps, most), n_lamps <= 2
+        spent = _Spent()
+        best: Steps | None = None
         for count in range(least, most + 1):
-            found, whole = self._at(n_lamps, count, n_eyes)
+            if best is not None and len(best.angles) < count:
+                break
+            found = self._at(kept, count, n_eyes, spent)
             if found is not None:
-                proof = _SEARCHED if refuted else _SERVED
-                return replace(found, lower_bound=least, proof=proof), least
-            refuted &= whole
+                best = found
+                break
+            refuted &= not spent.cut
             if refuted:
                 least = count + 1
-        return None, least
+            if spent.cut:
+                best = best or self._some(kept, n_eyes, most)
+                break
+            if best is None and spent.looked > _SOON:
+                best = self._some(kept, n_eyes, most)
+        if best is None:
+            return None, least
+        least = min(least, len(best.angles))
+        proof = _SEARCHED if refuted else _SERVED
+        return replace(best, lower_bound=least, proof=proof), least
+
+    def _kept(self, n_lamps: int, n_eyes: int) -> list[tuple[Place, ...]]:
+        """Places of projectors with which cameras may measure enough at all angles.
+
+        Those with which any cameras measure most come first.
+        """
+        lit, measured = self.cover.asked
+        kept: list[tuple[int, tuple[Place, ...]]] = []
+        for lamps in self._lamps(n_lamps):
+            self.scene.check_cancelled()
+            most = 0
+            light, anyone = self._bits(lamps)
+            for angles in self._cosets:
+                every = np.bitwise_or.reduce(light[angles], axis=0)
+                held = int(_count(np.bitwise_or.reduce(anyone[angles], axis=0)))
+                if _count(every) < lit or held < measured:
+                    continue
+                _, bits = self._measured(lamps, angles)
+                alone = np.sort(_count(bits))[-n_eyes:]
+                if alone.sum() >= measured and (
+                    n_lamps > 1 or next(_together(bits, n_eyes, measured), None)
+                ):
+                    most = max(most, held)
+            if most:
+                kept.append((-most, lamps))
+        return [lamps for _, lamps in sorted(kept)]
+
+    def _some(
+        self, kept: Sequence[tuple[Place, ...]], n_eyes: int, most: int
+    ) -> Steps | None:
+        """Steps that are enough: cameras that measure most of all, then angles."""
+        best: Steps | None = None
+        for lamps, angles in product(kept[:_FIRST], self._cosets):
+            self.scene.check_cancelled()
+            near, bits = self._measured(lamps, angles)
+            eyes = tuple(near[k] for k in _most(bits, n_eyes))
+            sets = self.sets.steps_of(lamps, eyes).take(angles)
+            cover = replace(self.cover, sets=sets)
+            if len(eyes) < n_eyes or cover.lacking(np.arange(len(angles))):
+                continue
+            few = solve_cover(cover.problem, seed=self.scene.seed, budget=_BUDGET)
+            steps = self._stands(lamps, eyes, angles[few.selected])
+            if steps is None or len(few.selected) > most:
+                continue
+            if best is None or len(steps.angles) < len(best.angles):
+                best = steps
+        return best
 
     def _least(self, n_lamps: int, most: int) -> int:
         """Fewest steps of so many projectors with any cameras at any place."""
@@ -133,35 +207,42 @@ class StepSearch:
         solution = solve_cover(cover.problem, seed=self.scene.seed, budget=_BUDGET)
         return -(-int(np.ceil(solution.lower_bound - 1e-9)) // n_lamps)
 
-    def _at(self, n_lamps: int, count: int, n_eyes: int) -> tuple[Steps | None, bool]:
-        """A choice of so many angles that is enough, and whether all were looked at.
+    def _at(
+        self,
+        kept: Sequence[tuple[Place, ...]],
+        count: int,
+        n_eyes: int,
+        spent: "_Spent",
+    ) -> Steps | None:
+        """A choice of so many angles that is enough.
 
         Of each choice of projectors those of most that any cameras measure come first.
         """
-        looked, tried = 0, 0
-        for lamps in self._lamps(n_lamps):
+        for lamps in kept:
             self.scene.check_cancelled()
-            angles = self._angles(lamps, count)
-            looked += comb(self.sets.lattice.n_places, count)
-            for row in angles:
-                tried += 1
+            for row in self._angles(lamps, count, spent):
+                spent.tried += 1
                 near, bits = self._measured(lamps, row)
                 for chosen in _together(bits, n_eyes, self.cover.asked[1]):
                     eyes = tuple(near[k] for k in chosen)
                     if (found := self._stands(lamps, eyes, row)) is not None:
-                        return found, True
-                if tried >= _TRIED:
-                    return None, False
-            if looked >= _ALL:
-                return None, False
-        return None, True
+                        return found
+                if spent.tried >= _TRIED:
+                    break
+            if spent.looked >= _ALL or spent.tried >= _TRIED:
+                spent.cut = True
+                return None
+        return None
 
-    def _angles(self, lamps: tuple[Place, ...], count: int) -> Ints:
-        """Sets of angles (m, count) that light enough and where any cameras measure it.
+    @property
+    def _cosets(self) -> list[Ints]:
+        """Places that the table can take to each other, as many as it has angles."""
+        lattice = self.sets.lattice
+        every = lattice.stride * np.arange(lattice.n_angles, dtype=np.int64)
+        return [every + begin for begin in range(lattice.stride)]
 
-        Those where they measure most come first.
-        """
-        lit, measured = self.cover.asked
+    def _bits(self, lamps: tuple[Place, ...]) -> tuple[_Bits, _Bits]:
+        """What projectors light at each angle, and any cameras measure, (A, b)."""
         light, anyone = (
             np.bitwise_or.reduce([np.roll(bits, i, axis=0) for bits, i in each])
             for each in (
@@ -169,13 +250,27 @@ class StepSearch:
                 [(self._circles[e].anyone, i) for e, i in lamps],
             )
         )
-        kept: list[Ints] = []
-        held: list[Ints] = []
-        for part in _subsets(len(light), count):
-            part = part[_count(_joined(light, part)) >= lit]
-            counts = _count(_joined(anyone, part))
-            kept.append(part[counts >= measured])
-            held.append(counts[counts >= measured])
+        return light, anyone
+
+    def _angles(self, lamps: tuple[Place, ...], count: int, spent: "_Spent") -> Ints:
+        """Sets of angles (m, count) that light enough and where any cameras measure it.
+
+        Those where they measure most come first.
+        """
+        lit, measured = self.cover.asked
+        light, anyone = self._bits(lamps)
+        kept: list[Ints] = [np.empty((0, count), dtype=np.int64)]
+        held: list[Ints] = [np.empty(0, dtype=np.int64)]
+        for places in self._cosets:
+            for rows in _subsets(len(places), count):
+                if spent.looked >= _ALL:
+                    break
+                spent.looked += len(rows)
+                part = places[rows]
+                part = part[_count(_joined(light, part)) >= lit]
+                counts = _count(_joined(anyone, part))
+                kept.append(part[counts >= measured])
+                held.append(counts[counts >= measured])
         order = np.argsort(-np.concatenate(held), kind="stable")
         return np.concatenate(kept)[order]
 
@@ -203,6 +298,8 @@ class StepSearch:
             *((lattice.cameras[f], k) for f, k in eyes),
         ]
         begins = lattice.begins(devices)
+        # The table can turn by its own angles only.
+        begins = begins[(begins + angles[0]) % lattice.stride == 0]
         cover = replace(self.cover, sets=self.sets.steps_of(lamps, eyes))
         if not len(begins) or cover.lacking(angles):
             return None
@@ -307,6 +404,17 @@ def _together(bits: _Bits, count: int, asked: int) -> Iterator[tuple[int, ...]]:
             found.append((-held, (k, *(k + 1 + j for j in rest))))
     for _, chosen in sorted(found):
         yield chosen
+
+
+def _most(bits: _Bits, count: int) -> list[int]:
+    """Return rows (n, b) that hold most, each beside those before it."""
+    held, chosen = np.zeros(bits.shape[1], dtype=np.uint8), list[int]()
+    while len(chosen) < min(count, len(bits)):
+        gains = _count(bits | held)
+        gains[chosen] = -1
+        chosen.append(int(np.argmax(gains)))
+        held |= bits[chosen[-1]]
+    return chosen
 
 
 def _moved(at: tuple[Place, ...], by: int, n_places: int) -> tuple[Place, ...]:

@@ -23,8 +23,9 @@ from planning.scene.workspace.shell_positions import Range
 
 _D = TypeVar("_D", PlannedProjector, PlannedCamera)
 
-# Places to a turn, where the table may stand at any angle.
-_FREE = 24
+# Places to a turn at least, and where the table may stand at any angle; and at most so
+# many of the angles are planned with, where it may stand at more that so many divide.
+_FREE, _FEWEST, _MOST = 24, 12, 36
 # Circles of latitude between the ends of the axis.
 _CIRCLES = 9
 # Devices that stand more than a share of a turn apart meet badly.
@@ -54,6 +55,19 @@ def about_axis(space: Workspace, table: Turntable) -> Workspace:
         projector_radius_m=wider(space.projector_radius_m),
         camera_radius_m=wider(space.camera_radius_m),
     )
+
+
+def planned_angles(steps: int | None) -> int:
+    """Return how many angles of a table are planned with, evenly over a turn.
+
+    Of many steps as many as divide their number, 36 at most; all where none do.
+    """
+    if steps is None:
+        return _FREE
+    if steps <= _MOST:
+        return steps
+    shared = [n for n in range(_FEWEST, _MOST + 1) if steps % n == 0]
+    return max(shared, default=steps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,9 +105,19 @@ class TableLattice:
         )
 
     @property
+    def n_angles(self) -> int:
+        """Angles of the table that are planned with."""
+        return planned_angles(self.table.steps)
+
+    @property
+    def stride(self) -> int:
+        """How many places the table turns by from one angle to the next."""
+        return max(1, -(-_FREE // self.n_angles)) if self.n_angles < _FREE else 1
+
+    @property
     def n_places(self) -> int:
-        """Places on a circle, and angles at which the table may stand."""
-        return self.table.steps or _FREE
+        """Places on a circle."""
+        return self.stride * self.n_angles
 
     @property
     def offsets(self) -> Ints:
