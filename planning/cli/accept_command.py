@@ -30,6 +30,7 @@ _READINGS: dict[Quantity, str] = {
 def accept_command(options: Mapping[str, Any]) -> int:
     """Measure the artefacts and print what a maker would; return the exit code."""
     plan = RigPlan.load(options["plan_file"])
+    plan.require_projectors("`plan accept`")
     scanner = Scanner.of(plan)
     seed = plan.document.seed if options["seed"] is None else options["seed"]
     found = accept(

@@ -32,6 +32,7 @@ from .console import print_json, reporter, writable
 def calibrate_command(options: Mapping[str, Any]) -> int:
     """Choose images of a board, write and print them; return 1 if they don't do."""
     plan = RigPlan.load(options["plan_file"])
+    plan.require_projectors("`plan calibrate`")
     across, down = _pair(options["marks"], "--marks", "12x9", (2.0, 100.0))
     if across % 1.0 or down % 1.0:
         raise click.UsageError(f"--marks {options['marks']} must be whole numbers")

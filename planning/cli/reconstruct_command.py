@@ -64,6 +64,7 @@ def reconstruct_command(options: Mapping[str, Any]) -> int:
     path = Path(options["plan_file"])
     report = reporter(quiet=options["quiet"])
     plan = RigPlan.load(path)
+    plan.require_projectors("`plan reconstruct`")
     scanner = Scanner.of(plan)
     folder = Path(options["output"] or path.parent)
     if options["captures"] is not None:

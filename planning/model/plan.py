@@ -14,7 +14,7 @@ from geometry.files.file_content import file_content
 from planning.model.document.coverage_records import Coverage, RegionRecord
 from planning.model.document.plan_document import FORMAT, VERSION, PlanDocument
 
-from .errors import PlanFileError, PlanningError
+from .errors import InputError, PlanFileError, PlanningError
 from .files import reading, write_together
 from .planned import PlannedCamera, PlannedProjector
 from .requirements import Requirements
@@ -50,6 +50,18 @@ class RigPlan:
     def cameras_alone(self) -> bool:
         """Whether there is no projector, and pairs of cameras measure by texture."""
         return self.requirements.pattern == "none"
+
+    def require_projectors(self, what: str) -> None:
+        """Refuse what is made with projectors where there are none.
+
+        Raises:
+            InputError: If cameras measure alone.
+        """
+        if self.cameras_alone:
+            raise InputError(
+                f"{what} needs projectors, and this plan's pattern is 'none'; `plan "
+                f"verify` renders and matches what its cameras see"
+            )
 
     @cached_property
     def projectors(self) -> tuple[PlannedProjector, ...]:

@@ -76,4 +76,10 @@ def views_alone(wishes: Wishes) -> int:
             f"views = {views} must be from 2 to {MOST_VIEWS} with pattern 'none': one "
             f"camera alone measures nothing"
         )
+    most = wishes.max_cameras
+    if most is not None and most < views:
+        raise InputError(
+            f"views = {views} with max_cameras = {most}: what counts must be seen by "
+            f"more cameras than there may be; ask for fewer, or allow more"
+        )
     return views

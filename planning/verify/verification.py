@@ -133,6 +133,7 @@ def verify_plan(
         progress: Receives a line when a stage begins.
 
     Raises:
+        InputError: If `truth` can't be rendered for the plan.
         PlanFileError: If the plan is broken, so that its claims have no meaning.
     """
 
@@ -140,6 +141,11 @@ def verify_plan(
         if progress is not None:
             progress(line)
 
+    if truth is not None and truth.cameras_alone != plan.cameras_alone:
+        raise InputError(
+            "what stands there and the plan must have projectors both, or neither; "
+            "give a plan of the same pattern"
+        )
     threads = threads or n_threads()
     seed = plan.document.seed if seed is None else seed
     say("audit: recomputing every claim on fresh samples")

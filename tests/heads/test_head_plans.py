@@ -7,8 +7,9 @@ import pytest
 from support.group_rigs import head_rig, planned
 
 from geometry.shapes.boxes import box_gap
-from planning.model.errors import InputError
+from planning.model.errors import InputError, PlanFileError
 from planning.model.planned import meet
+from planning.report.summary.station_lines import fewest_words
 from planning.rig.rig import Rig
 from planning.scene.draws import DRAWS
 from planning.scene.placed_bodies import placed_box
@@ -81,6 +82,10 @@ def test_the_audit_finds_every_claim_true(plan):
         (lambda s: s["stations"][0].update(id="H9"), "station"),
         (lambda s: s["count"].update(lower_bound=99), "lower_bound"),
         (lambda s: s["count"].update(count=1), "count"),
+        (lambda s: s["count"].update(greedy=0), "greedy"),
+        (lambda s: s["count"].update(n_candidates=5), "n_candidates"),
+        (lambda s: s.update(way_m=1.0), "way_m"),
+        (lambda s: s["stations"][0].update(angle=0.5), "angle"),
         (lambda s: s.update(n_reference=3), "n_reference"),
         (lambda s: s.update(cross=True), "station"),
         (lambda s: s.update(kind="turntable"), "axis"),
@@ -94,6 +99,11 @@ def test_lies_about_heads_are_found(plan, handmade, change, told):
     lie = handmade.tampered(plan, lambda document: change(document["stations"]))
     failures = audit_plan(lie, n_samples=2000).failures
     assert any(told in failure for failure in failures)
+
+
+def test_a_head_that_holds_nothing_is_refused(plan, handmade):
+    with pytest.raises(PlanFileError, match="devices"):
+        handmade.tampered(plan, lambda d: d["rig"]["head"].update(devices=[]))
 
 
 def test_a_pair_across_heads_measures_nothing(plan, handmade):
@@ -114,7 +124,7 @@ def test_a_pair_across_heads_measures_nothing(plan, handmade):
     assert (across.pairs > alone.pairs).any()
 
 
-def test_stations_of_one_head_are_in_the_order_of_the_shortest_way(few):
+def test_stations_of_one_head_are_in_the_order_of_the_shortest_way(few, handmade):
     rig = head_rig(stations={"carrier": "robot"})
     carried = planned(rig, max_heads=9)
     told = carried.document.stations
@@ -128,6 +138,16 @@ def test_stations_of_one_head_are_in_the_order_of_the_shortest_way(few):
     assert all(len(group) == 1 for group in groups)
     assert audit_plan(carried, n_samples=4000).failures == ()
 
+    def longer(document):
+        stations = document["stations"]["stations"]
+        stations[0], stations[1] = stations[1], stations[0]
+        at = [np.array(s["world_from_station"])[:3, 3] for s in stations]
+        way = np.linalg.norm(np.diff(at, axis=0), axis=1).sum()
+        document["stations"]["way_m"] = float(way)
+
+    failures = audit_plan(handmade.tampered(carried, longer), n_samples=2000).failures
+    assert any("in another" in failure for failure in failures)
+
 
 def test_too_few_heads_measure_what_they_can_and_say_how_many_would(few):
     short = planned(head_rig(), max_heads=1)
@@ -135,6 +155,19 @@ def test_too_few_heads_measure_what_they_can_and_say_how_many_would(few):
     assert (len(short.projectors), len(short.cameras)) == (1, 2)
     assert count.needed > 1
     assert count.lower_bound > 1
+
+
+def test_heads_that_never_have_room_beside_each_other_end_and_claim_nothing(few):
+    """No two housings keep three metres apart: one stands, and no number is known."""
+    place = {"standoff_mm": 600.0, "clearance_mm": 3000.0}
+    short = planned(head_rig(head={"body": _BODY}, placement=place), max_heads=9)
+    count = short.document.stations.count
+    assert (count.count, count.needed) == (1, None)
+    assert count.lower_bound > 1
+    audit = audit_plan(short, n_samples=3000)
+    assert audit.failures == ()
+    assert audit.unmet
+    assert "housings keep off each other" in fewest_words(short)
 
 
 def test_the_plan_is_the_same_with_two_threads(plan):

@@ -12,7 +12,7 @@ from planning.cameras.stations.turntable import table_lattice
 from planning.cameras.stations.turntable.table_lattice import TableLattice, about_axis
 from planning.cameras.stations.turntable.table_sets import TableSets
 from planning.model.device_poses import moved_to
-from planning.model.errors import InfeasibleLimitsError, InputError
+from planning.model.errors import InfeasibleLimitsError, InputError, PlanFileError
 from planning.scene.draws import DRAWS
 from planning.steps.prepare import prepared
 from planning.verify.audit.audit import audit_plan
@@ -89,10 +89,37 @@ def test_steps_for_other_devices_are_told_and_more_devices_take_no_more(plan):
         (lambda s: s.update(point_m=[0.0, 0.0, 0.0]), "point_m"),
         (lambda s: s["count"].update(lower_bound=99), "lower_bound"),
         (lambda s: s["stations"].reverse(), "projectors"),
+        (lambda s: s.update(count=None), "count"),
+        (lambda s: s.update(steps=[]), "each once"),
+        (lambda s: s["steps"].append(s["steps"][0]), "each once"),
+        (lambda s: [row.update(steps=1) for row in s["steps"]], "needed"),
+        (lambda s: [row.update(lower_bound=0) for row in s["steps"]], "needed"),
+        (lambda s: s["count"].update(needed=9, lower_bound=9), "needed"),
+        (lambda s: s["stations"][0].update(angle=2.0 * np.pi), "less than a turn"),
+        (lambda s: s["stations"][1].update(id="T1"), "all different"),
     ],
 )
 def test_lies_about_steps_are_found(plan, handmade, change, told):
     lie = handmade.tampered(plan, lambda document: change(document["stations"]))
+    failures = audit_plan(lie, n_samples=2000).failures
+    assert any(told in failure for failure in failures)
+
+
+def test_a_step_of_devices_that_the_plan_lacks_is_refused(plan, handmade):
+    def change(document):
+        document["stations"]["stations"][0]["projectors"] = ["P9"]
+
+    with pytest.raises(PlanFileError, match="P9"):
+        handmade.tampered(plan, change)
+
+
+@pytest.mark.parametrize(
+    ("steps", "told"), [({"steps": 5}, "evenly"), ({"max_steps": 1}, "may have")]
+)
+def test_angles_that_the_table_of_the_rig_lacks_are_found(plan, handmade, steps, told):
+    lie = handmade.tampered(
+        plan, lambda document: document["rig"]["turntable"].update(steps)
+    )
     failures = audit_plan(lie, n_samples=2000).failures
     assert any(told in failure for failure in failures)
 
@@ -134,7 +161,7 @@ def test_what_pairs_measure_at_an_angle_is_what_they_do_turned_back(few):
 
 def test_too_few_devices_are_told_with_the_angles(few):
     rig = table_rig(table={"max_steps": 1})
-    with pytest.raises(InfeasibleLimitsError, match="at 1 angles"):
+    with pytest.raises(InfeasibleLimitsError, match="at 1 angle of the table"):
         planned(rig, max_projectors=1, max_cameras=1)
 
 

@@ -7,6 +7,7 @@ from planning.model.bodies import Obstacle
 from planning.model.planned import PlannedCamera
 from planning.verify.reconstruction.render.mitsuba.materials import Surface
 from planning.verify.reconstruction.render.mitsuba.scene_files import write_scenes
+from planning.verify.reconstruction.render.mitsuba.scene_text import SceneError
 from planning.verify.reconstruction.scanner import Scanner
 
 from .exported_rig import ExportedRig, id_words
@@ -41,9 +42,11 @@ def write_mitsuba(
         ambient: Light of the room; None: what the plan's check assumes.
 
     Raises:
-        SceneError: If the pixels of a camera aren't square.
+        SceneError: If there is no projector, or the pixels of a camera aren't square.
         OSError: If it can't be written.
     """
+    if rig.plan.cameras_alone:
+        raise SceneError("a scene is of a projector, and this plan's pattern is 'none'")
     of_plan = Scanner.of(rig.plan)
     projectors = [
         d.planned for d in rig.devices if not isinstance(d.planned, PlannedCamera)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import asdict
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -59,7 +59,7 @@ class HeadRecord(Part):
     """The sensor head of a rig; its frame is x right, y down, z into the volume."""
 
     name: str
-    devices: tuple[HeadDeviceRecord, ...]
+    devices: Annotated[tuple[HeadDeviceRecord, ...], Field(min_length=2)]
     volume: VolumeRecord
     working_m: float
     body: Body | None = None

@@ -115,6 +115,14 @@ class PlanDocument(Part):
     timings_s: dict[str, float]
 
     @model_validator(mode="after")
+    def _stations_hold_devices(self) -> Self:
+        stations = () if self.stations is None else self.stations.stations
+        named = {n for one in stations for n in (*one.projectors, *one.cameras)}
+        if more := named - {d.id for d in (*self.projectors, *self.cameras)}:
+            raise ValueError(f"stations name {sorted(more)}, which aren't in the plan")
+        return self
+
+    @model_validator(mode="after")
     def _has_certificates(self) -> Self:
         alone = self.requirements.pattern == "none"
         if (self.certificates.projectors is None) is not alone:

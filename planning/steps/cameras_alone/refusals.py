@@ -24,10 +24,9 @@ def check_alone(request: PlanRequest) -> None:
             f"projector and camera; leave robust out"
         )
     if wishes.survive:
-        more = (wishes.views or 2) + 1
         raise InputError(
             f"{_ALONE} with survive = {wishes.survive}: the loss of a camera isn't "
-            f"planned for among cameras alone; ask for views = {more}"
+            f"planned for among cameras alone; leave survive out"
         )
     if wishes.ring_axis is not None:
         raise InputError(

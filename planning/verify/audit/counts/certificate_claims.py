@@ -215,6 +215,12 @@ def _audit_by_count(kind: DeviceKind, case: AuditCase, findings: AuditFindings) 
     """
     claims, whole, count = kind.proof, case.estimator.target_m2, kind.proof.count
     most = {entry.count: entry.upper_bound_m2 for entry in claims.by_count}
+    counts = [entry.count for entry in claims.by_count]
+    findings.holds(
+        counts == sorted(set(counts)) and min(counts, default=1) > 0,
+        "by_count",
+        f"rows of {counts}: each number once, rising from 1 at least",
+    )
     entries = {f"by_count: for {e.count}": e for e in claims.by_count}
     for name, entry in ({"best_area": claims.best_area} | entries).items():
         findings.holds(

@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 
 from geometry.arrays import Array
-from planning.model.document.head_records import HeadRecord
+from planning.model.document.head_records import HeadRecord, TurntableRecord
 from planning.model.document.station_records import (
     StationCount,
     StationRecord,
@@ -38,8 +38,10 @@ def audit_stations(case: AuditCase, findings: AuditFindings) -> None:
     else:
         _audit_heads(plan, told, case.shadow, below)
     _audit_reference(plan, told, below)
-    if told.count is not None:
-        _audit_count(told, told.count, below.at("count"))
+    ids = [one.id for one in told.stations]
+    below.holds(len(set(ids)) == len(ids), "", f"{ids} aren't all different")
+    if below.holds(told.count is not None, "count", "is missing") and told.count:
+        _audit_count(plan, told, told.count, below.at("count"))
 
 
 def _audit_members(
@@ -74,6 +76,7 @@ def _audit_heads(
     poses = {d.id: d.world_from_device for d in (*plan.projectors, *plan.cameras)}
     findings.same("head", told.head, head.name, "the rig's head")
     for one in told.stations:
+        findings.same(f"{one.id}.angle", one.angle, None, "no turntable")
         members = [poses.get(name) for name in (*one.projectors, *one.cameras)]
         _audit_rigid(head, one, members, findings)
     _audit_housings(plan, head, told, shadow, findings)
@@ -84,6 +87,27 @@ def _audit_heads(
         way = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
         slack = 2.0 * len(places) * _POSITION_M
         findings.number("way_m", told.way_m or 0.0, way, slack, "m")
+        shorter = _shorter_way(places)
+        findings.holds(
+            shorter >= way - slack,
+            "way_m",
+            f"{1e3 * way:.1f} mm in the order given, {1e3 * shorter:.1f} in another",
+        )
+    else:
+        findings.same("way_m", told.way_m, None, "heads that all stand")
+
+
+def _shorter_way(places: Array) -> float:
+    """Shortest way with two places exchanged, or a part of it turned round [m]."""
+    n, least = len(places), np.inf
+    for i, j in combinations(range(n), 2):
+        turned = [*range(i), *range(i, j + 1)[::-1], *range(j + 1, n)]
+        exchanged = list(range(n))
+        exchanged[i], exchanged[j] = j, i
+        for order in (turned, exchanged):
+            legs = np.diff(places[order], axis=0)
+            least = min(least, float(np.linalg.norm(legs, axis=1).sum()))
+    return least
 
 
 def _audit_housings(
@@ -160,6 +184,7 @@ def _audit_steps(plan: RigPlan, told: StationsRecord, findings: AuditFindings) -
             key,
             f"{claimed.tolist()} is claimed, the rig's turntable has {list(truth)}",
         )
+    _audit_angles(table, told, findings)
     poses = {d.id: d.world_from_device for d in (*plan.projectors, *plan.cameras)}
     first = told.stations[0]
     for one in told.stations:
@@ -184,6 +209,31 @@ def _audit_steps(plan: RigPlan, told: StationsRecord, findings: AuditFindings) -
                 f"{one.id}.{again}",
                 f"is {1e3 * gap:.3g} mm off {name} as the part sees it",
             )
+
+
+def _audit_angles(
+    table: TurntableRecord, told: StationsRecord, findings: AuditFindings
+) -> None:
+    """Steps are different angles that the rig's table has, and no more of them."""
+    angles = np.array([one.angle or 0.0 for one in told.stations])
+    findings.holds(
+        bool(((angles >= 0.0) & (angles < 2.0 * np.pi)).all())
+        and bool((np.diff(np.sort(angles)) > _ROUNDING).all()),
+        "",
+        f"angles {angles.tolist()} must be different, from 0 to less than a turn",
+    )
+    findings.holds(
+        len(angles) <= (table.max_steps or len(angles)),
+        "",
+        f"{len(angles)} steps, and the rig's turntable may have {table.max_steps}",
+    )
+    if table.steps is not None:
+        places = angles * table.steps / (2.0 * np.pi)
+        findings.holds(
+            bool((np.abs(places - np.round(places)) <= _ROUNDING * table.steps).all()),
+            "",
+            f"angles {angles.tolist()} are none of {table.steps} evenly over a turn",
+        )
 
 
 def _turned_back(axis: Array, point: Array, angle: float) -> Array:
@@ -240,29 +290,73 @@ def _audit_reference(
 
 
 def _audit_count(
-    told: StationsRecord, count: StationCount, findings: AuditFindings
+    plan: RigPlan, told: StationsRecord, count: StationCount, findings: AuditFindings
 ) -> None:
-    n = len(told.stations)
+    n, known = len(told.stations), count.needed is not None
+    needed = count.needed or 0
     findings.same("count", count.count, n, "the number of stations")
+    for key, least in (
+        ("lower_bound", count.lower_bound),
+        ("everywhere", count.everywhere or 0),
+    ):
+        findings.holds(
+            0 <= least and (least <= needed or not known),
+            key,
+            f"{least} must be at most needed = {needed}",
+        )
     findings.holds(
-        0 <= count.lower_bound <= count.needed,
-        "lower_bound",
-        f"{count.lower_bound} must be at most needed = {count.needed}",
-    )
-    findings.holds(
-        count.everywhere is None or count.everywhere <= count.needed,
-        "everywhere",
-        f"{count.everywhere} over every pose is more than {count.needed}, which do",
+        count.greedy is None or count.greedy >= count.lower_bound,
+        "greedy",
+        f"{count.greedy} is fewer than the bound of {count.lower_bound}",
     )
     findings.holds(
         max(count.lit, count.measured) <= count.n_samples,
         "n_samples",
         f"{count.lit} lit and {count.measured} measured of {count.n_samples}",
     )
-    lines = [row for row in told.steps if row.steps is not None]
-    for row in lines:
+    if told.kind == "turntable":
+        _audit_trade(told, count, findings)
+        return
+    head = plan.document.rig.head
+    most, each = plan.requirements.max_projectors, 1
+    if head is not None:
+        each = sum(device.kind == "projector" for device in head.devices)
+    # More suffice than are planned only where no more may be, or have room.
+    findings.holds(
+        needed <= n or n * each == most or (head is not None and head.body is not None),
+        "needed",
+        f"{needed} are claimed to suffice, {n} are planned of {most // each} allowed",
+    )
+    of_candidates = told.n_reference - n
+    findings.same(
+        "n_candidates", count.n_candidates, of_candidates, "the reference heads"
+    )
+
+
+def _audit_trade(
+    told: StationsRecord, count: StationCount, findings: AuditFindings
+) -> None:
+    """Numbers of devices each once, and the row of the plan's own is its count."""
+    one = told.stations[0]
+    own = len(one.projectors), len(one.cameras)
+    rows = {(row.projectors, row.cameras): row for row in told.steps}
+    findings.holds(
+        len(rows) == len(told.steps) and own in rows,
+        "steps",
+        f"rows of {sorted(rows)}: each once, among them the plan's own {own}",
+    )
+    for row in told.steps:
         findings.holds(
-            row.lower_bound <= (row.steps or 0),
+            row.steps is None or row.lower_bound <= row.steps,
             "steps",
             f"{row.steps} steps with a bound of {row.lower_bound}",
+        )
+    if own in rows:
+        row = rows[own]
+        findings.holds(
+            (row.steps, row.lower_bound) == (count.needed, count.lower_bound)
+            and (count.needed or 0) <= count.count,
+            "needed",
+            f"{count.needed}, at least {count.lower_bound}, of {count.count} steps; "
+            f"the table has {row.steps}, at least {row.lower_bound}",
         )

@@ -43,16 +43,19 @@ def audit_tables(case: AuditCase, findings: AuditFindings) -> None:
                 f"rows of {counts} devices: each number once, among them the plan's "
                 f"{len(kind.devices)}",
             )
+            # Alone, fewer cameras than must see what counts measure nothing.
+            least = case.plan.requirements.min_views or 1
             for number, area in table:
                 key = f"marginal.{kind.name}s.{number}.{verb}_{part}_m2"
                 if number == len(kind.devices):
                     case.estimator.audit(key, area, chosen, findings, part=part)
                     continue
+                most = whole * (1.0 + ROUNDING) if number >= least else 0.0
                 findings.holds(
-                    0.0 <= area <= whole * (1.0 + ROUNDING),
+                    0.0 <= area <= most,
                     key,
                     f"{area!r} is claimed, must be an area of at most "
-                    f"{square_centimetres(whole)}",
+                    f"{square_centimetres(most)}",
                 )
         slack = case.estimator.tolerance(
             chosen & case.samples.in_target, case.estimator.target_m2

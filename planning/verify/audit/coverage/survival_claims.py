@@ -266,8 +266,12 @@ def _audit_count(
     Whatever is lost, what is left is a cover: so of covers the bound is one less.
     """
     findings.number("count", claims.count, len(kind.devices), 0.0, "")
+    # More are needed than are planned only where no more may be, or are in stock.
+    stopped = kind.most in (None, claims.count) or kind.is_counted
     findings.holds(
-        claims.lower_bound <= claims.needed and claims.count <= claims.needed,
+        claims.lower_bound <= claims.needed
+        and claims.count <= claims.needed
+        and (claims.count == claims.needed or stopped),
         "needed",
         f"{claims.needed} suffice beside at least {claims.lower_bound}, and "
         f"{claims.count} in the plan",
