@@ -3,11 +3,13 @@
 import json
 
 import pytest
+from click.testing import CliRunner
 from support.little_work import draw_fewer, work_little
 
 from geometry.shapes.primitives import sphere
 from planning import load_rig, plan_rig
 from planning.cameras.photogrammetry import view_selection
+from planning.cli.main import commands
 from planning.model.errors import InputError, PlanFileError
 from planning.model.plan import RigPlan
 from planning.proofs import camera_bound
@@ -93,6 +95,30 @@ def test_the_audit_confirms_every_claim(plan):
     assert "every claim holds" in told
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("accept", "{plan}"),
+        ("calibrate", "{plan}"),
+        ("reconstruct", "{plan}"),
+        ("export", "{folder}", "--to", "mitsuba"),
+    ],
+)
+def test_commands_that_need_projectors_say_so_in_a_line(plan, tmp_path, words):
+    plan.save(tmp_path / "plan.json")
+    places = {"plan": tmp_path / "plan.json", "folder": tmp_path}
+    words = [word.format(**places) for word in words]
+    result = CliRunner().invoke(commands, [*words, "--quiet"])
+    said = result.output + str(result.exception)
+    assert isinstance(result.exception, InputError | SystemExit)
+    assert "pattern is 'none'" in said
+
+
+def test_what_stands_there_has_projectors_where_the_plan_has(plan, handmade):
+    with pytest.raises(InputError, match="projectors both, or neither"):
+        verify_plan(handmade.make_plan(), truth=plan, threads=1)
+
+
 def test_what_is_written_is_what_is_read(plan, tmp_path):
     plan.save(tmp_path / "plan.json")
     again = RigPlan.load(tmp_path / "plan.json")
@@ -144,6 +170,15 @@ def bound_of_99(document):
     document["certificates"]["cameras"]["candidates"]["lower_bound"] = 99
 
 
+def one_measures(document):
+    (row,) = (row for row in document["marginal"] if row["n_cameras"] == 1)
+    row["measured_surface_m2"] = 1e-6
+
+
+def row_of_two(document):
+    document["certificates"]["cameras"]["by_count"][0]["count"] = 2
+
+
 def cleared(key, value):
     return told(lambda document: document.update({key: value}))
 
@@ -168,6 +203,8 @@ def cleared(key, value):
         (told(lambda d: d["requirements"].update(min_views=3)), "measured_m2"),
         (cleared("assumed", []), "assumed"),
         (told(lambda d: d["cost"].update(n_frames=2)), "cost.n_frames"),
+        (told(one_measures), "marginal.cameras.1"),
+        (told(row_of_two), "by_count"),
         (
             told(lambda d: d["requirements"]["triangulation"].update(max_angle=1.3)),
             "triangulation.max_angle",
@@ -217,6 +254,7 @@ def test_a_certificate_of_no_projector_isnt_read(plan):
         ({"max_cameras": 1}, "max_cameras = 1 must be 2 or more"),
         ({"views": 1}, "views = 1 must be from 2 to 8"),
         ({"views": 9}, "views = 9 must be from 2 to 8"),
+        ({"views": 4, "max_cameras": 3}, "seen by more cameras than there may be"),
         ({"survive": 1}, "the loss of a camera"),
         ({"robust": 0.9}, "leave robust out"),
         ({"cameras_by": "paper"}, "take 'cover'"),
