@@ -15,6 +15,8 @@ from PIL import Image, ImageDraw
 from geometry.rays.rays import RayCaster
 from planning.model.plan import RigPlan
 from planning.model.words import count_words
+from planning.report.summary.device_lines import devices_words
+from planning.report.summary.station_lines import STATIONS
 from planning.scene.placed_bodies import kind_of
 
 from .error_bar import draw_error_bar
@@ -64,6 +66,8 @@ def draw_rig(
         raise ValueError(f"a picture of a rig needs at least 800 x 500 px, got {size}")
     mesh = plan.surface.mesh
     colours, legend = status_colours(face_status, len(mesh.faces))
+    if plan.cameras_alone:
+        legend = [(text.replace("lit but ", ""), colour) for text, colour in legend]
     shader = Shader(RayCaster(mesh), colours)
     figures = device_figures(
         plan, body_m=0.09 * max(plan.requirements.workspace.projector_radius_m)
@@ -166,7 +170,11 @@ def _close_up(
     shown = {figure.kind for figure in zone_figures(plan)}
     rows = [
         *legend,
-        *((f"{kind}s", colour) for kind, colour in _DEVICES.items()),
+        *(
+            (f"{kind}s", colour)
+            for kind, colour in _DEVICES.items()
+            if getattr(plan, f"{kind}s")
+        ),
         *((kind, colour) for kind, colour in ZONES.items() if kind in shown),
     ]
     if obstacle_figures(plan, zone_reach(plan)):
@@ -213,8 +221,7 @@ def _draw_title(
     draw: ImageDraw.ImageDraw, plan: RigPlan, size: tuple[int, int]
 ) -> None:
     """Write how many devices, what object and what is measured into a band."""
-    projectors = count_words(len(plan.projectors), "projector")
-    headline = f"{projectors}, {count_words(len(plan.cameras), 'camera')}"
+    headline = _headline(plan)
     pad, middle = 16 * SUPERSAMPLING, size[1] // 2
     draw.text((pad, middle), headline, INK, font=font(24.0), anchor="lm")
     extent = 1e3 * np.ptp(plan.surface.mesh.bounds, axis=0)
@@ -235,6 +242,15 @@ def _draw_title(
     right = size[0] - 4 * pad - draw.textlength(claim, font=font(16.0))
     inset = 0.12 * size[1]
     draw_error_bar(draw, plan.coverage.sigma, (left, inset, right, size[1] - inset))
+
+
+def _headline(plan: RigPlan) -> str:
+    """Return how many devices there are, and at how many stations."""
+    told, devices = plan.document.stations, devices_words(plan, ", ")
+    if told is None:
+        return devices
+    stations = count_words(len(told.stations), STATIONS[told.kind])
+    return f"{stations}: {devices}"
 
 
 def _shortened(name: str) -> str:

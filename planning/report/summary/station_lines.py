@@ -14,7 +14,8 @@ from planning.model.document.station_records import (
 from planning.model.plan import RigPlan
 from planning.model.words import count_words, labelled
 
-_WORDS = {"heads": "head", "stations": "station", "turntable": "step"}
+# What a station is called, by kind.
+STATIONS = {"heads": "head", "stations": "station", "turntable": "step"}
 _MOST = 8
 _HEADING = "position x, y, z [mm] of the head's origin   pan    tilt    roll   devices"
 
@@ -24,7 +25,7 @@ def fewest_words(plan: RigPlan) -> str:
     told = plan.document.stations
     if told is None or told.count is None:
         return ""
-    count, word = told.count, _WORDS[told.kind]
+    count, word = told.count, STATIONS[told.kind]
     over = f"over {count.n_candidates} candidates"
     if count.needed is None:
         return (
@@ -63,7 +64,7 @@ def station_lines(plan: RigPlan) -> list[str]:
     told = plan.document.stations
     if told is None:
         return []
-    label, up = f"{_WORDS[told.kind].upper()}S", plan.requirements.workspace.up
+    label, up = f"{STATIONS[told.kind].upper()}S", plan.requirements.workspace.up
     lines = [title_words(told)]
     if told.kind != "turntable":
         lines.append(_HEADING)
@@ -85,7 +86,7 @@ def _row(one: StationRecord, up: Array) -> str:
 
 def title_words(told: StationsRecord) -> str:
     """Return what stands at the stations, in a sentence."""
-    n, word = len(told.stations), _WORDS[told.kind]
+    n, word = len(told.stations), STATIONS[told.kind]
     if told.kind == "turntable":
         angles = [one.angle for one in told.stations if one.angle is not None]
         shown = ", ".join(f"{np.degrees(a):.4g}" for a in angles[:_MOST])

@@ -125,7 +125,8 @@ def _audit_continuous(
 ) -> None:
     """What holds for all poses holds for the candidates too, on equal samples.
 
-    The candidates are the reference poses, so that they reach as large a share.
+    The candidates are the reference poses, so that they reach no larger a share, and
+    what is required; not all, where devices that were moved reach what none does.
     """
     claims = kind.proof
     table = claims.continuous
@@ -142,7 +143,13 @@ def _audit_continuous(
     if whole > 0.0:
         share = kind.reachable_m2 / whole
         slack = max(samples, 1) * _noise(samples, share, 1.0)
-        below.number("n_reached", table.n_reached, samples * share, slack, "samples")
+        most, least = samples * share, kind.share * samples * share
+        below.holds(
+            least - slack <= table.n_reached <= most + slack,
+            "n_reached",
+            f"claimed {table.n_reached} samples, recomputed {least:.6g} that are "
+            f"required to {most:.6g}, tolerance {slack:.3g}",
+        )
     below.holds(
         table.n_reached <= samples, "n_reached", f"{table.n_reached} of {samples}"
     )
