@@ -101,6 +101,19 @@ def test_lies_about_heads_are_found(plan, handmade, change, told):
     assert any(told in failure for failure in failures)
 
 
+def test_a_housing_between_another_head_and_the_object_is_found(plan, handmade):
+    """The first head is moved half-way to the object from where the second stands."""
+
+    def between(document):
+        one, other = document["stations"]["stations"][:2]
+        pose = np.array(other["world_from_station"])
+        pose[:3, 3] *= 0.5
+        one["world_from_station"] = pose.tolist()
+
+    failures = audit_plan(handmade.tampered(plan, between), n_samples=2000).failures
+    assert any("stands between" in failure for failure in failures)
+
+
 def test_a_head_that_holds_nothing_is_refused(plan, handmade):
     with pytest.raises(PlanFileError, match="devices"):
         handmade.tampered(plan, lambda d: d["rig"]["head"].update(devices=[]))

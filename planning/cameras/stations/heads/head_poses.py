@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import permutations
 from typing import TypeVar
 
 import numpy as np
@@ -19,7 +20,7 @@ from planning.scene.workspace.admissible import admissible
 from planning.scene.workspace.candidates import Candidates
 from planning.scene.workspace.shell_positions import Range
 
-from .housings import collision, has_room
+from .housings import collision, has_room, in_the_way
 
 _D = TypeVar("_D", PlannedProjector, PlannedCamera)
 
@@ -41,6 +42,12 @@ class PlacedHead:
     projectors: tuple[PlannedProjector, ...]
     cameras: tuple[PlannedCamera, ...]
     quarters: int = 0
+
+    @property
+    def places(self) -> Array:
+        """Optical centres of its devices, (n, 3)."""
+        devices = (*self.projectors, *self.cameras)
+        return np.stack([device.world_from_device[:3, 3] for device in devices])
 
     def named(self, station: str) -> "PlacedHead":
         """Return the head with its devices at a station of that name."""
@@ -104,13 +111,29 @@ class HeadSource:
         )
 
     def colliding(self, heads: Sequence[PlacedHead]) -> tuple[int, int] | None:
-        """Return two heads whose housings collide; None: none, or one is carried."""
-        if self.carried:
+        """Return two heads of which a housing is in the other's way; None: none are.
+
+        They collide, or one stands in the light or the view of the other.
+        """
+        body = self.head.body
+        if self.carried or body is None:
             return None
         clearance = self.scene.requirements.workspace.clearance_m
-        return collision(
-            self.head.body, [head.world_from_head for head in heads], clearance
-        )
+        pair = collision(body, [head.world_from_head for head in heads], clearance)
+        if pair is not None:
+            return pair
+        for i, j in permutations(range(len(heads)), 2):
+            pose, places = heads[i].world_from_head, heads[j].places
+            if in_the_way(body, pose, places, self._ball):
+                return i, j
+        return None
+
+    @cached_property
+    def _ball(self) -> tuple[Array, float]:
+        """A ball that holds all of the object: centre (3,), radius [m]."""
+        centre = np.array(self.scene.requirements.workspace.centre)
+        ways = self.scene.mesh.vertices - centre
+        return centre, float(np.linalg.norm(ways, axis=1).max())
 
     @cached_property
     def _view(self) -> PlannedCamera:

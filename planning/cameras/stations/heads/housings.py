@@ -1,7 +1,7 @@
 """The housing of a head: room for it, and between heads that stand at once.
 
-It keeps off the object, obstacles, floor, walls and zones, and off the others. That it
-may stand in their light isn't counted.
+It keeps off the object, obstacles, floor, walls and zones, off the others, and out of
+their light and views of the object.
 """
 
 from collections.abc import Sequence
@@ -38,3 +38,29 @@ def collision(
         if boxes_overlap(a, b) or box_gap(a, b) < clearance_m:
             return i, j
     return None
+
+
+def in_the_way(
+    body: Body, pose: Array, places: Array, ball: tuple[Array, float]
+) -> bool:
+    """Return whether a housing may stand between places (n, 3) and an object in a ball.
+
+    With S, r the ball about the housing and C, R that of the object: from a place O
+    they overlap, and the housing isn't beyond the object::
+
+        angle(S - O, C - O) < asin(r / |S - O|) + asin(R / |C - O|)
+        |S - O| - r < |C - O| + R
+
+    In a ball about the housing any place is taken to have it in the way.
+    """
+    box, (centre, radius) = placed_box(body, pose), ball
+    to_box, to_object = box.centre - places, centre - places
+    far, deep = (np.linalg.norm(way, axis=1) for way in (to_box, to_object))
+    cosine = np.einsum("ij,ij->i", to_box, to_object) / np.maximum(far * deep, 1e-300)
+    apart = np.arccos(np.clip(cosine, -1.0, 1.0))
+    wide = sum(
+        np.arcsin(np.clip(r / np.maximum(d, 1e-300), 0.0, 1.0))
+        for r, d in ((box.radius, far), (radius, deep))
+    )
+    before = (apart < wide) & (far - box.radius < deep + radius)
+    return bool((before | (far <= box.radius)).any())

@@ -1,6 +1,6 @@
 """Claims about heads, stations and steps: who stands where, and how many are needed."""
 
-from itertools import combinations
+from itertools import combinations, permutations
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.devices.body_claims import audit_body_zones
 from planning.verify.audit.devices.zone_claims import origin_of
-from planning.verify.audit.predicates.occlusion import Block, Shadow, touches
+from planning.verify.audit.predicates.occlusion import Block, touches
 
 # Poses are written to 0.01 mm, of devices and of what carries them.
 _POSITION_M = 3e-5
@@ -36,7 +36,7 @@ def audit_stations(case: AuditCase, findings: AuditFindings) -> None:
     if told.kind == "turntable":
         _audit_steps(plan, told, below)
     else:
-        _audit_heads(plan, told, case.shadow, below)
+        _audit_heads(plan, told, case, below)
     _audit_reference(plan, told, below)
     ids = [one.id for one in told.stations]
     below.holds(len(set(ids)) == len(ids), "", f"{ids} aren't all different")
@@ -66,7 +66,7 @@ def _audit_members(
 
 
 def _audit_heads(
-    plan: RigPlan, told: StationsRecord, shadow: Shadow, findings: AuditFindings
+    plan: RigPlan, told: StationsRecord, case: AuditCase, findings: AuditFindings
 ) -> None:
     """Devices of a head stand as the rig's head says, wherever it stands."""
     head = plan.document.rig.head
@@ -79,7 +79,7 @@ def _audit_heads(
         findings.same(f"{one.id}.angle", one.angle, None, "no turntable")
         members = [poses.get(name) for name in (*one.projectors, *one.cameras)]
         _audit_rigid(head, one, members, findings)
-    _audit_housings(plan, head, told, shadow, findings)
+    _audit_housings(plan, head, told, case, findings)
     if told.kind == "stations":
         places = np.array(
             [np.array(s.world_from_station)[:3, 3] for s in told.stations]
@@ -114,10 +114,11 @@ def _audit_housings(
     plan: RigPlan,
     head: HeadRecord,
     told: StationsRecord,
-    shadow: Shadow,
+    case: AuditCase,
     findings: AuditFindings,
 ) -> None:
     """Housings keep off object, obstacles, zones, and each other where all stand."""
+    shadow = case.shadow
     body, space = head.body, plan.requirements.workspace
     if body is None:
         return
@@ -141,6 +142,29 @@ def _audit_housings(
             f"{name}.body",
             f"comes nearer to that of {other} than {1e3 * space.clearance_m:g} mm",
         )
+    if told.kind == "heads":
+        _audit_light(plan, told, blocks, case.samples.points, findings)
+
+
+def _audit_light(
+    plan: RigPlan,
+    told: StationsRecord,
+    blocks: dict[str, Block],
+    points: Array,
+    findings: AuditFindings,
+) -> None:
+    """No housing stands between the object and a device of another head."""
+    at = {d.id: d.world_from_device[:3, 3] for d in (*plan.projectors, *plan.cameras)}
+    for one, other in permutations(told.stations, 2):
+        for name in (*other.projectors, *other.cameras):
+            stopped = int(
+                blocks[one.id].meets(np.tile(at[name], (len(points), 1)), points).sum()
+            )
+            findings.holds(
+                stopped == 0,
+                f"{one.id}.body",
+                f"stands between {name} and {stopped} of {len(points)} samples",
+            )
 
 
 def _audit_rigid(
