@@ -59,6 +59,15 @@ def test_devices_of_a_step_are_those_of_the_room_turned_back(plan):
             assert np.exp(1j * turn) == pytest.approx(np.exp(1j * (a - b)), abs=1e-3)
 
 
+def test_devices_stand_upright_whichever_way_the_part_turns(few):
+    rig = table_rig(table={"axis": [0.0, 0.0, -3.0]})
+    turned = planned(rig, max_projectors=1, max_cameras=2, coverage=0.8)
+    for device in (*turned.projectors, *turned.cameras):
+        # The image's y points down.
+        assert device.world_from_device[2, 1] < 0.0
+    assert audit_plan(turned, n_samples=2000).failures == ()
+
+
 def test_the_audit_finds_every_claim_true(plan):
     audit = audit_plan(plan, n_samples=5000)
     assert audit.failures == ()

@@ -141,11 +141,13 @@ class TableLattice:
         side = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
         side /= np.linalg.norm(side)
         radius = 0.5 * sum(self._shell(template))
+        # Which way the part turns doesn't turn devices over.
+        up = axis if axis @ np.array(self.space.up) >= 0.0 else -axis
         for k in range(1, _CIRCLES + 1):
             latitude = np.pi * (k / (_CIRCLES + 1) - 0.5)
             out = np.cos(latitude) * side + np.sin(latitude) * axis
             place = (aim + radius * out)[None]
-            (pose,) = aimed_poses(place, aim, axis, template.device)
+            (pose,) = aimed_poses(place, aim, up, template.device)
             yield moved_to(template, pose)
 
     def room(self, device: Device) -> Mask:
