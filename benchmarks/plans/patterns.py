@@ -1,9 +1,10 @@
 """Eight meshes by every kind of scanner: counts, bounds, coverage, check and audit.
 
-Usage: python -m benchmarks.plans.patterns [NAME ...]   (ringrig installed, from a
-    checkout)
+Usage: python -m benchmarks.plans.patterns [NAME or KIND ...]   (ringrig installed,
+    from a checkout)
 
-Plans meshes of `../shared/data/meshes` (those named, if any), each in the unit or size
+Plans meshes of `../shared/data/meshes` (those named, if any, by the kinds of scanner
+named, if any: rings, dense, none, head, turntable), each in the unit or size
 that `tests/support/shared_meshes.py` states: by rings and by coded pixels with as many
 projectors as it takes, by cameras alone, by poses of one sensor head, and before a
 turntable of 24 angles about the axis that points up. Rigs are `default` but for the
@@ -44,9 +45,9 @@ def main(names: list[str]) -> int:
     well = True
     with tempfile.TemporaryDirectory() as folder:
         for mesh in shared_meshes.MESHES:
-            if mesh.name not in (names or _MESHES):
+            if mesh.name not in (set(names) - set(_KINDS) or _MESHES):
                 continue
-            for kind in _KINDS:
+            for kind in [k for k in _KINDS if k in names] or _KINDS:
                 done = run(mesh.path, (*mesh.words, *_words(kind, mesh, Path(folder))))
                 cells, false = _row(done)
                 well &= done.code in (0, 1, 4) and not false
