@@ -9,6 +9,7 @@ from support.group_rigs import head_rig, planned
 from geometry.shapes.boxes import box_gap
 from planning.model.errors import InputError, PlanFileError
 from planning.model.planned import meet
+from planning.report.page.per_face import centroids, per_face
 from planning.report.summary.station_lines import fewest_words
 from planning.rig.rig import Rig
 from planning.scene.draws import DRAWS
@@ -221,3 +222,14 @@ def test_heads_need_a_rig_that_has_one():
 
     with pytest.raises(InputError, match=r"no \[head\]"):
         planned(load_rig("default"), max_heads=2)
+
+
+def test_the_page_counts_pairs_of_one_head_alone(plan):
+    facts = per_face(plan, centroids(plan), threads=1)
+    for p, projector in enumerate(plan.projectors):
+        for c, camera in enumerate(plan.cameras):
+            if not meet(projector.station, camera.station):
+                assert (facts.pairs[p, c] == -1).all()
+    cameras = len(plan.cameras) // len(plan.projectors)
+    assert facts.n_pairs.max() <= cameras * len(plan.projectors)
+    assert facts.n_pairs.max() > 0

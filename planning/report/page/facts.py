@@ -78,6 +78,7 @@ def _device(device: PlannedProjector | PlannedCamera) -> dict[str, Any]:
         "id": device.id,
         "kind": "camera",
         "existing": device.existing,
+        "station": device.station,
         "pose": device.world_from_device.tolist(),
         "resolution": list(optics.resolution),
         "range": list(optics.range_m),

@@ -198,6 +198,8 @@ def _of_chunk(
     for c, camera in enumerate(cameras):
         sight[c] = sight_steps(camera, samples, limits.camera, shadow)
     pairs = np.where(light[:, None] == LIT, sight[None], np.int8(-1))
+    together = np.array([[c.works_with(p) for c in cameras] for p in projectors])
+    pairs[~together.reshape(n_p, n_c)] = -1
     failing = np.full((n_p, n_c, n), np.nan)
     best, least = np.full(n, -1), np.full(n, np.inf)
     terms: dict[str, Array] = {}

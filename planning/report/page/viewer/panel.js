@@ -102,6 +102,9 @@ export class Panel {
     this.lights.forEach((projector, p) =>
       this.cameras.forEach((camera, c) => {
         if (this.alone && p >= c) return;
+        // Devices of two stations are no pair: they measure one after the other.
+        const [a, b] = [projector.station, camera.station];
+        if (a && b && a !== b) return;
         if (!this.steps(projector, face).good || !this.steps(camera, face).good) return;
         const pair = p * this.cameras.length + c;
         const passed = this.arrays.get("pairs")[pair][face];
