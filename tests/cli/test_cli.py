@@ -456,7 +456,7 @@ def test_a_hollow_bust_exits_1_and_says_how_much_why_and_what_helps(tmp_path):
     if not mesh.exists():
         pytest.skip("../shared/data isn't there")
     words = ["--mesh", str(mesh), "--unit", "in", "--max-projectors", "3", "--no-check"]
-    words += ["-o", str(tmp_path), "--quiet"]
+    words += ["--cameras-by", "cover", "-o", str(tmp_path), "--quiet"]
     done = run(*words, cwd=tmp_path, before=LITTLE)
     assert done.returncode == 1, done.stderr
     assert "can be lit from anywhere" in done.stdout
