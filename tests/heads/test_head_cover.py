@@ -70,6 +70,15 @@ def test_selections_lack_nothing_where_all_requirements_are_met(seed, floor):
     assert len(solution.selected) == fewest
     assert _enough(scene, sets, solution.selected)
     assert fewest <= len(_greedy(cover)[0]) <= HEADS
+    # What all of the light, or of what is measured, asks for takes no more.
+    least, proof = cover.proved(solution, seed=0, budget=1e7)
+    assert least == fewest
+    assert proof
+    for number, done in zip(cover.totals, (sets.lit, sets.measured), strict=True):
+        part = solve_cover(cover.of_one(number))
+        asked = cover.quotas.floors[number]
+        assert done[:, part.selected].any(axis=1).sum() >= asked
+        assert len(part.selected) <= fewest
 
 
 def test_each_head_offered_is_lacking_what_the_whole_selection_would_be():

@@ -16,7 +16,7 @@ _ROUNDS = 4
 # Of a lattice's spacing: how far around a head it is moved, round by round.
 _SCALES = (1.0, 0.5, 0.25)
 # Counted work of the cover whose bound is told, and of each other cover.
-_PROOF_BUDGET, _BUDGET = 4e9, 5e7
+_PROOF_BUDGET, _BUDGET = 1e9, 5e7
 # Of what is asked, at most that a head less is lacking before it is moved together.
 _NEARLY = 0.06
 # Times that one of two heads that collide is left out and the others are sought anew.
@@ -142,7 +142,7 @@ def _fewest_of(
         chosen = known
     if source.colliding([heads[k] for k in chosen]) is not None:
         chosen = _fewest_apart(source, heads, cover, chosen)
-    bound = int(np.ceil(first.lower_bound - 1e-9))
+    bound, proof = cover.proved(first, seed=seed, budget=_PROOF_BUDGET)
     needed = None if cover.lacking(chosen) else len(chosen)
     if needed is None or needed > most:
         few = solve_max_coverage(cover.problem, most, seed=seed, budget=_BUDGET)
@@ -151,7 +151,7 @@ def _fewest_of(
             chosen = _apart(source, heads, cover, most)
     whole, met = _greedy(cover)
     greedy = len(whole) if met else None
-    return FoundHeads(heads, cover, chosen, needed, bound, first.proof, greedy)
+    return FoundHeads(heads, cover, chosen, needed, bound, proof, greedy)
 
 
 def _fewest_apart(

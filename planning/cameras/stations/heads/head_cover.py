@@ -23,7 +23,7 @@ from planning.scene.limits.projector_limits import LIT
 from planning.scene.measured import LitSamples, measured_by
 from planning.scene.samples import Target, merged
 from planning.scene.scene import Scene
-from solvers import CoverProblem
+from solvers import CoverProblem, CoverSolution, solve_cover
 
 from .head_poses import PlacedHead
 
@@ -143,6 +143,34 @@ class HeadCover:
         """The cover as solvers take it."""
         return cover_problem(self.covers, self.quotas)
 
+    def of_one(self, number: int) -> CoverProblem:
+        """Return the cover of what is asked under one number alone, without others."""
+        rows = self.quotas.regions.row == number
+        floor = np.array([0, self.quotas.floors[number]])
+        ones = RegionFloors(np.ones(int(rows.sum()), dtype=np.int64), 2)
+        return cover_problem(self.covers[rows], Quotas(int(floor[1]), ones, floor))
+
+    def proved(
+        self, solution: CoverSolution, *, seed: int, budget: float
+    ) -> tuple[int, str]:
+        """Return the least number of heads that is proved, and what proves it.
+
+        Of the cover, as it was solved, or of what all of the light asks for, or all
+        that is measured: that is no more than is asked, and of a cover without regions
+        more is proved with as much work.
+        """
+        parts = [
+            solve_cover(self.of_one(number), seed=seed, budget=budget)
+            for number in self.totals
+        ]
+        best = max((solution, *parts), key=lambda each: each.lower_bound)
+        return int(np.ceil(best.lower_bound - 1e-9)), best.proof
+
+    @property
+    def totals(self) -> tuple[int, int]:
+        """Numbers of what is asked of all that is lit, and measured, of no region."""
+        return 1, 1 + (len(self.quotas.floors) - 1) // 2
+
     def lacking(self, chosen: Ints) -> int:
         """Return how many rows are lacking of all that is asked, at least 0."""
         served = self.covers[:, chosen].any(axis=1)
@@ -154,5 +182,5 @@ class HeadCover:
     @property
     def asked(self) -> tuple[int, int]:
         """How many samples must be lit, and measured, of all."""
-        each = (len(self.quotas.floors) - 1) // 2
-        return int(self.quotas.floors[1]), int(self.quotas.floors[1 + each])
+        lit, measured = self.totals
+        return int(self.quotas.floors[lit]), int(self.quotas.floors[measured])

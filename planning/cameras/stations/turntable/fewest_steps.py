@@ -205,7 +205,8 @@ class StepSearch:
         if cover.lacking(np.arange(together.lit.shape[1])):
             return most + 1
         solution = solve_cover(cover.problem, seed=self.scene.seed, budget=_BUDGET)
-        return -(-int(np.ceil(solution.lower_bound - 1e-9)) // n_lamps)
+        least, _ = cover.proved(solution, seed=self.scene.seed, budget=_BUDGET)
+        return -(-least // n_lamps)
 
     def _at(
         self,
