@@ -35,7 +35,8 @@ def main() -> int:
         return 0
     mesh, rig = load_mesh(_BUNNY.path, unit="m"), load_rig(_RIG)
     print(
-        "| angle [deg] | asked | views | on its samples | greedy on them | least: candidates | all poses "
+        "| angle [deg] | asked | views | on its samples | greedy on them "
+        "| least: candidates | all poses "
         "| candidates | samples | proof | measured of the target | false | seconds |"
     )
     print("|" + 13 * "---|")
