@@ -32,7 +32,9 @@ def stages_of(
     """Return the devices of heads as stages of which nothing is proved.
 
     What is proved is of heads. After the planned ones stand those of the reference set,
-    each of which measures by itself.
+    each of which measures by itself. Samples are none that heads or steps were fitted
+    to:
+    of those more is lit than of others.
     """
     heads = [*planned, *reference]
     projectors = tuple(p for head in heads for p in head.projectors)
@@ -49,7 +51,6 @@ def stages_of(
         projectors[:n_projectors],
         candidates,
     )
-    target = scene.target_samples(DRAWS.cameras)
     # Reference cameras without a station measure with the planned projectors alone.
     lamps = tuple(p for k, p in enumerate(projectors) if k < n_projectors or p.station)
     lit = lit_stages(scene, lamps, target) == LIT
