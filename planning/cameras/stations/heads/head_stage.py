@@ -32,9 +32,8 @@ def stages_of(
     """Return the devices of heads as stages of which nothing is proved.
 
     What is proved is of heads. After the planned ones stand those of the reference set,
-    each of which measures by itself. Samples are none that heads or steps were fitted
-    to:
-    of those more is lit than of others.
+    each of which measures by itself. Samples are none that heads or steps were
+    fitted to: of those more is lit than of others.
     """
     heads = [*planned, *reference]
     projectors = tuple(p for head in heads for p in head.projectors)
