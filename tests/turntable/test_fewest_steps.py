@@ -1,6 +1,7 @@
 """The fewest steps of small tables, against every choice of places and angles."""
 
 from itertools import combinations, product
+from math import comb
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,7 +9,8 @@ import pytest
 
 from geometry.mesh.sampling import SurfaceSamples
 from planning.cameras.stations.heads.head_cover import HeadCover
-from planning.cameras.stations.turntable.fewest_steps import StepSearch, _together
+from planning.cameras.stations.turntable.fewest_steps import StepSearch
+from planning.cameras.stations.turntable.sample_bits import rows_together, subsets
 from planning.cameras.stations.turntable.table_sets import TableSets
 from planning.scene.samples import Target
 
@@ -152,10 +154,19 @@ def test_rows_that_hold_enough_together_are_all_found(count):
     rng = np.random.default_rng(count)
     rows = rng.random((7, 24)) < 0.35
     bits, asked = np.packbits(rows, axis=1), 15
-    found = set(_together(bits, count, asked))
+    found = set(rows_together(bits, count, asked))
     truth = {
         chosen
         for chosen in combinations(range(7), count)
         if rows[list(chosen)].any(axis=0).sum() >= asked
     }
     assert {tuple(sorted(chosen)) for chosen in found} == truth
+
+
+@pytest.mark.parametrize("count", [1, 4, 5])
+def test_subsets_are_all_there_are_and_each_once(count):
+    """Of 24 angles 42,504 sets of five: more than are yielded at once."""
+    every = np.concatenate(list(subsets(24, count)))
+    assert len(every) == comb(24, count)
+    assert len(np.unique(every, axis=0)) == len(every)
+    assert (np.diff(every, axis=1) > 0).all()

@@ -14,10 +14,9 @@ with whom::
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations, combinations_with_replacement, product
+from itertools import combinations_with_replacement, product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry.arrays import Ints
 from planning.cameras.stations.heads.head_cover import HeadCover
@@ -25,6 +24,15 @@ from planning.scene.placed_bodies import Device
 from planning.scene.scene import Scene
 from solvers import solve_cover
 
+from .circle import Circle
+from .sample_bits import (
+    Bits,
+    held_by,
+    joined,
+    rows_of_most,
+    rows_together,
+    subsets,
+)
 from .table_sets import Place, TableSets
 
 _BUDGET = 2e8
@@ -33,11 +41,8 @@ _BUDGET = 2e8
 # are enough are looked for in another way, with the first of the projectors.
 _ALL, _TRIED = 20_000_000, 4000
 _SOON, _FIRST = 1_000_000, 4
-_AT_ONCE = 20_000
 _SEARCHED = "every choice of places and angles"
 _SERVED = "what any cameras serve at a step"
-
-_Bits = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,34 +62,6 @@ class Steps:
     angles: Ints
     lower_bound: int
     proof: str
-
-
-@dataclass(frozen=True, eq=False)
-class _Circle:
-    """What a projector at place 0 of its circle does at each angle, as bits of samples.
-
-    Attributes:
-        lit: Shape (A, b).
-        anyone: What any cameras measure with it, shape (A, b).
-        measured: What a camera does, by its place, shape (A, b) each.
-    """
-
-    lit: _Bits
-    anyone: _Bits
-    measured: dict[Place, _Bits]
-
-    @classmethod
-    def of(cls, sets: TableSets, e: int) -> "_Circle":
-        """Return what the projector of a circle does."""
-        lamp = ((e, 0),)
-        return cls(
-            _packed(sets.steps_of(lamp, ()).lit),
-            _packed(sets.steps_of(lamp, None).measured),
-            {
-                eye: _packed(sets.steps_of(lamp, (eye,)).measured)
-                for eye in sets.near(lamp[0])
-            },
-        )
 
 
 @dataclass
@@ -116,15 +93,15 @@ class StepSearch:
         return cls(scene, sets, HeadCover.of(scene, sets.everywhere()))
 
     def fewest(self, n_lamps: int, n_eyes: int, most: int) -> tuple[Steps | None, int]:
-        """Return the fewest steps for so many devices, and what is proved of them.
+        """Return the fewest steps of one or two projectors, and what is proved of them.
 
         None: at most so many steps weren't found to be enough; are they refuted, the
         bound is above them.
         """
         most, kept = min(most, self.sets.lattice.n_angles), self._kept(n_lamps, n_eyes)
-        if not kept and n_lamps <= 2:
+        if not kept:
             return None, most + 1
-        least, refuted = self._least(n_lamps, most), n_lamps <= 2
+        least, refuted = self._least(n_lamps, most), True
         spent = _Spent()
         best: Steps | None = None
         for count in range(least, most + 1):
@@ -161,13 +138,13 @@ class StepSearch:
             light, anyone = self._bits(lamps)
             for angles in self._cosets:
                 every = np.bitwise_or.reduce(light[angles], axis=0)
-                held = int(_count(np.bitwise_or.reduce(anyone[angles], axis=0)))
-                if _count(every) < lit or held < measured:
+                held = int(held_by(np.bitwise_or.reduce(anyone[angles], axis=0)))
+                if held_by(every) < lit or held < measured:
                     continue
                 _, bits = self._measured(lamps, angles)
-                alone = np.sort(_count(bits))[-n_eyes:]
+                alone = np.sort(held_by(bits))[-n_eyes:]
                 if alone.sum() >= measured and (
-                    n_lamps > 1 or next(_together(bits, n_eyes, measured), None)
+                    n_lamps > 1 or next(rows_together(bits, n_eyes, measured), None)
                 ):
                     most = max(most, held)
             if most:
@@ -182,7 +159,7 @@ class StepSearch:
         for lamps, angles in product(kept[:_FIRST], self._cosets):
             self.scene.check_cancelled()
             near, bits = self._measured(lamps, angles)
-            eyes = tuple(near[k] for k in _most(bits, n_eyes))
+            eyes = tuple(near[k] for k in rows_of_most(bits, n_eyes))
             sets = self.sets.steps_of(lamps, eyes).take(angles)
             cover = replace(self.cover, sets=sets)
             if len(eyes) < n_eyes or cover.lacking(np.arange(len(angles))):
@@ -224,7 +201,7 @@ class StepSearch:
             for row in self._angles(lamps, count, spent):
                 spent.tried += 1
                 near, bits = self._measured(lamps, row)
-                for chosen in _together(bits, n_eyes, self.cover.asked[1]):
+                for chosen in rows_together(bits, n_eyes, self.cover.asked[1]):
                     eyes = tuple(near[k] for k in chosen)
                     if (found := self._stands(lamps, eyes, row)) is not None:
                         return found
@@ -242,7 +219,7 @@ class StepSearch:
         every = lattice.stride * np.arange(lattice.n_angles, dtype=np.int64)
         return [every + begin for begin in range(lattice.stride)]
 
-    def _bits(self, lamps: tuple[Place, ...]) -> tuple[_Bits, _Bits]:
+    def _bits(self, lamps: tuple[Place, ...]) -> tuple[Bits, Bits]:
         """What projectors light at each angle, and any cameras measure, (A, b)."""
         light, anyone = (
             np.bitwise_or.reduce([np.roll(bits, i, axis=0) for bits, i in each])
@@ -263,13 +240,13 @@ class StepSearch:
         kept: list[Ints] = [np.empty((0, count), dtype=np.int64)]
         held: list[Ints] = [np.empty(0, dtype=np.int64)]
         for places in self._cosets:
-            for rows in _subsets(len(places), count):
+            for rows in subsets(len(places), count):
                 if spent.looked >= _ALL:
                     break
                 spent.looked += len(rows)
                 part = places[rows]
-                part = part[_count(_joined(light, part)) >= lit]
-                counts = _count(_joined(anyone, part))
+                part = part[held_by(joined(light, part)) >= lit]
+                counts = held_by(joined(anyone, part))
                 kept.append(part[counts >= measured])
                 held.append(counts[counts >= measured])
         order = np.argsort(-np.concatenate(held), kind="stable")
@@ -277,10 +254,10 @@ class StepSearch:
 
     def _measured(
         self, lamps: tuple[Place, ...], angles: Ints
-    ) -> tuple[list[Place], _Bits]:
+    ) -> tuple[list[Place], Bits]:
         """Places of cameras, and what each measures at angles with them, (n, b)."""
         places, n_bytes = self.sets.lattice.n_places, self._circles[0].lit.shape[1]
-        every: dict[Place, _Bits] = {}
+        every: dict[Place, Bits] = {}
         for e, i in lamps:
             for (f, k), bits in self._circles[e].measured.items():
                 own = np.bitwise_or.reduce(bits[(angles - i) % places], axis=0)
@@ -316,106 +293,23 @@ class StepSearch:
         )
 
     @cached_property
-    def _circles(self) -> list[_Circle]:
-        return [_Circle.of(self.sets, e) for e in range(self._n_circles)]
+    def _circles(self) -> list[Circle]:
+        return [Circle.of(self.sets, e) for e in range(self._n_circles)]
 
     @cached_property
     def _n_circles(self) -> int:
         return len(self.sets.lattice.projectors)
 
     def _lamps(self, count: int) -> Iterator[tuple[Place, ...]]:
-        """Yield places of projectors, all of one or two of them.
-
-        Of more those that light most, found one after another.
-        """
+        """Yield places of projectors, all of one or two of them."""
         circles, places = range(self._n_circles), self.sets.lattice.n_places
         if count == 1:
             yield from (((e, 0),) for e in circles)
             return
-        if count == 2:
-            for e, f in combinations_with_replacement(circles, 2):
-                # On one circle half a turn is as good as the other half.
-                turn = places // 2 + 1 if e == f else places
-                yield from (((e, 0), (f, i)) for i in range(e == f, turn))
-            return
-        chosen: tuple[Place, ...] = ()
-        while len(chosen) < count:
-            every = product(circles, range(places))
-            others = [one for one in every if one not in chosen]
-            light = [self._light((*chosen, one)) for one in others]
-            chosen = (*chosen, others[int(np.argmax(light))])
-        yield chosen
-
-    def _light(self, lamps: tuple[Place, ...]) -> float:
-        """How much projectors light at all angles together, then on average."""
-        lit = self.sets.steps_of(lamps, ()).lit
-        return float(lit.any(axis=1).sum()) + float(lit.mean())
-
-
-def _packed(rows: NDArray[np.bool_]) -> _Bits:
-    return np.packbits(rows.T, axis=1)
-
-
-def _joined(bits: _Bits, sets: Ints) -> _Bits:
-    """What sets (m, k) of rows (A, b) hold together, (m, b)."""
-    together = np.zeros((len(sets), bits.shape[1]), dtype=np.uint8)
-    for column in sets.T:
-        together |= bits[column]
-    return together
-
-
-def _count(bits: _Bits) -> Ints:
-    return np.bitwise_count(bits).sum(axis=-1, dtype=np.int64)
-
-
-def _subsets(n: int, count: int) -> Iterator[Ints]:
-    """Yield all sets of so many of n, many at once, (m, count)."""
-    every = combinations(range(n), count)
-    while True:
-        part = [one for one, _ in zip(every, range(_AT_ONCE), strict=False)]
-        if not part:
-            return
-        yield np.array(part, dtype=np.int64)
-
-
-def _together(bits: _Bits, count: int, asked: int) -> Iterator[tuple[int, ...]]:
-    """Yield which rows (n, b), one to three at once, hold enough; the most first."""
-    n = len(bits)
-    if count == 1:
-        held = _count(bits)
-        for k in np.argsort(-held, kind="stable"):
-            if held[k] < asked:
-                return
-            yield (int(k),)
-        return
-    alone = _count(bits)
-    best = int(alone.max(initial=0))
-    found: list[tuple[int, tuple[int, ...]]] = []
-    for k in range(n - count + 1):
-        if alone[k] + (count - 1) * best < asked:
-            continue
-        joined = bits[k] | bits[k + 1 :]
-        if count == 2:
-            held = _count(joined)
-            good = np.flatnonzero(held >= asked)
-            found += [(-int(held[j]), (k, k + 1 + int(j))) for j in good]
-            continue
-        for rest in _together(joined, count - 1, asked):
-            held = int(_count(np.bitwise_or.reduce(joined[list(rest)])))
-            found.append((-held, (k, *(k + 1 + j for j in rest))))
-    for _, chosen in sorted(found):
-        yield chosen
-
-
-def _most(bits: _Bits, count: int) -> list[int]:
-    """Return rows (n, b) that hold most, each beside those before it."""
-    held, chosen = np.zeros(bits.shape[1], dtype=np.uint8), list[int]()
-    while len(chosen) < min(count, len(bits)):
-        gains = _count(bits | held)
-        gains[chosen] = -1
-        chosen.append(int(np.argmax(gains)))
-        held |= bits[chosen[-1]]
-    return chosen
+        for e, f in combinations_with_replacement(circles, 2):
+            # On one circle half a turn is as good as the other half.
+            turn = places // 2 + 1 if e == f else places
+            yield from (((e, 0), (f, i)) for i in range(e == f, turn))
 
 
 def _moved(at: tuple[Place, ...], by: int, n_places: int) -> tuple[Place, ...]:
