@@ -1,6 +1,6 @@
 """A plan in the making: what was ordered, and the stages as far as they came."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.parallel import n_threads
@@ -116,6 +116,12 @@ class PartialPlan:
     def scene(self) -> Scene:
         """Surface, target and requirements."""
         return self.ready.scene
+
+    def told(self, **changes: object) -> "PartialPlan":
+        """Return the same with other words about its stations."""
+        assert self.stationed is not None
+        record = self.stationed.record.changed(**changes)
+        return replace(self, stationed=replace(self.stationed, record=record))
 
     @property
     def final_projectors(self) -> tuple[PlannedProjector, ...]:

@@ -49,7 +49,7 @@ def heads_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
     with clock.stage("bounds", "bounds over all poses of the workspace"):
         effort = projector_bound.PROVE if request.prove else projector_bound.DEFAULT
         everywhere = least_by_light(ready.scene, found.heads, ready.templates, effort)
-    partial = replace(partial, stationed=_bounded(partial.stationed, everywhere))
+    partial = partial.told(count=_count(found, everywhere))
     while True:
         plan = yield partial, True
         assert plan is not None
@@ -61,15 +61,6 @@ def heads_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
         found, count = more, len(more.chosen)
         clock.say(f"  fresh samples fall short: {count_words(count, 'head')}")
         partial = _placed(ready, head, found, everywhere, clock)
-
-
-def _bounded(stationed: Stationed | None, everywhere: int | None) -> Stationed:
-    """The same with the bound over all poses."""
-    assert stationed is not None
-    record = stationed.record
-    assert record.count is not None
-    count = record.count.changed(everywhere=everywhere)
-    return replace(stationed, record=record.changed(count=count))
 
 
 def _fewest(
@@ -112,26 +103,13 @@ def _placed(
     reference = [one.named(f"reference {k}") for k, one in enumerate(found.heads)]
     with clock.stage("heads", "heads: what their devices light and measure"):
         lights, views = stages_of(ready.scene, planned, reference)
-    asked = found.cover.asked
-    count = StationCount(
-        count=len(heads),
-        needed=found.needed,
-        lower_bound=found.lower_bound,
-        n_candidates=len(found.heads),
-        n_samples=len(found.cover.sets.target),
-        lit=asked[0],
-        measured=asked[1],
-        proof=found.proof,
-        everywhere=everywhere,
-        greedy=found.greedy,
-    )
     record = StationsRecord(
         kind="stations" if carried else "heads",
         head=head.name,
         cross=head.cross,
         stations=(),
         n_reference=len(planned) + len(reference),
-        count=count,
+        count=_count(found, everywhere),
     )
     if way is not None:
         record = record.changed(way_m=way)
@@ -143,6 +121,23 @@ def _placed(
         views.cameras,
         axes=None,
         stationed=Stationed(placements, record),
+    )
+
+
+def _count(found: FoundHeads, everywhere: int | None) -> StationCount:
+    """How many there are, and what is proved of them and `everywhere`."""
+    lit, measured = found.cover.asked
+    return StationCount(
+        count=len(found.chosen),
+        needed=found.needed,
+        lower_bound=found.lower_bound,
+        n_candidates=len(found.heads),
+        n_samples=len(found.cover.sets.target),
+        lit=lit,
+        measured=measured,
+        proof=found.proof,
+        everywhere=everywhere,
+        greedy=found.greedy,
     )
 
 

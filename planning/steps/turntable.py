@@ -72,19 +72,21 @@ def steps_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
         sets = TableSets.of(scene, lattice, scene.target_samples(DRAWS.cameras))
     search = StepSearch.of(scene, sets)
     most = min(table.max_steps or lattice.n_angles, lattice.n_angles)
-    partial, traded = None, _Traded((), {})
+    partial, first, traded = None, None, _Traded((), {})
     for traded in _trades(search, request, most, clock):
         if partial is None and traded.found:
-            taken = next(iter(traded.found))
-            partial = _placed(ready, search, traded, taken, clock)
+            first = next(iter(traded.found))
+            partial = _placed(ready, search, traded, first, clock)
             yield partial, False
-    if partial is None:
+    if partial is None or first is None:
         raise InfeasibleLimitsError(_too_little(request, traded, lattice, most))
-    found = traded.found
-    taken = next(iter(found))
+    taken, found = first, traded.found
     if request.wishes.max_cameras is not None:
         taken = min(found, key=lambda pair: (len(found[pair].angles), sum(pair)))
-    partial = _placed(ready, search, traded, taken, clock)
+    if taken == first:
+        partial = partial.told(steps=traded.rows)
+    else:
+        partial = _placed(ready, search, traded, taken, clock)
     plan = yield partial, True
     for spare in _SPARE:
         assert plan is not None

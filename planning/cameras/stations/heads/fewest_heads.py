@@ -2,12 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from geometry.arrays import Ints, Mask
 from planning.scene.draws import DRAWS
-from solvers import solve_cover, solve_max_coverage
+from solvers import CoverSolution, solve_cover, solve_max_coverage
 
 from .head_cover import HeadCover, HeadSets
 from .head_poses import HeadSource, PlacedHead
@@ -52,20 +53,17 @@ class FoundHeads:
 
         None: no other head adds anything and has room.
         """
-        count, problem = len(self.chosen) + 1, self.cover.problem
+        count, seed = len(self.chosen) + 1, source.scene.seed
         more = solve_max_coverage(
-            *(problem, count),
+            *(self.cover.problem, count),
             warm_start=self.chosen,
-            seed=source.scene.seed,
+            seed=seed,
             budget=_BUDGET,
         ).selected
-        if source.colliding([self.heads[k] for k in more]) is not None:
-            more = self.chosen
-        if len(more) <= len(self.chosen):
+        together = [self.heads[k] for k in more]
+        if len(more) < count or source.colliding(together) is not None:
             more = _apart(source, self.heads, self.cover, count, self.chosen)
-        if len(more) <= len(self.chosen):
-            return None
-        return replace(self, chosen=more)
+        return None if len(more) < count else replace(self, chosen=more)
 
     @property
     def taken(self) -> tuple[PlacedHead, ...]:
@@ -87,16 +85,29 @@ def fewest_heads(
     scene, heads = source.scene, source.over(n)
     sets = HeadSets.of(scene, heads, scene.target_samples(DRAWS.cameras))
     heads, sets, known = _with_better(source, heads, sets, n, least)
-    found = _fewest_of(source, heads, sets, most, known)
+    fewest = _fewest_of(source, heads, sets, most, known)
     for draw in range(_ROUNDS):
         fresh = scene.target_samples(DRAWS.fresh_cameras.later(1 + draw))
         again = HeadSets.of(scene, heads, fresh)
-        met = found.needed is not None and found.needed <= most
-        if not met or not HeadCover.of(scene, again).lacking(found.chosen):
+        met = fewest.needed is not None and fewest.needed <= most
+        if not met or not HeadCover.of(scene, again).lacking(fewest.chosen):
             break
         sets = sets.with_samples(again)
-        found = _fewest_of(source, heads, sets, most, known)
-    return found
+        fewest = _fewest_of(source, heads, sets, most, known)
+    cover, chosen, needed, solution = fewest
+    bound, proof = cover.proved(solution, seed=scene.seed, budget=_PROOF_BUDGET)
+    whole, met = _greedy(cover)
+    greedy = len(whole) if met else None
+    return FoundHeads(heads, cover, chosen, needed, bound, proof, greedy)
+
+
+class _Fewest(NamedTuple):
+    """The fewest of one draw's samples, as of `FoundHeads`, before what is proved."""
+
+    cover: HeadCover
+    chosen: Ints
+    needed: int | None
+    solution: CoverSolution
 
 
 def _with_better(
@@ -129,29 +140,26 @@ def _fewest_of(
     sets: HeadSets,
     most: int,
     known: Ints,
-) -> FoundHeads:
+) -> _Fewest:
     """Return the fewest of some heads whose housings don't collide.
 
-    The bound is of any, colliding or not. Those known may be fewer than the search
+    The solution is of any, colliding or not. Those known may be fewer than the search
     finds.
     """
     cover, seed = HeadCover.of(source.scene, sets), source.scene.seed
-    first = solve_cover(cover.problem, seed=seed, budget=_PROOF_BUDGET)
-    chosen = first.selected
+    solution = solve_cover(cover.problem, seed=seed, budget=_PROOF_BUDGET)
+    chosen = solution.selected
     if len(known) and len(known) < len(chosen) and not cover.lacking(known):
         chosen = known
     if source.colliding([heads[k] for k in chosen]) is not None:
         chosen = _fewest_apart(source, heads, cover, chosen)
-    bound, proof = cover.proved(first, seed=seed, budget=_PROOF_BUDGET)
     needed = None if cover.lacking(chosen) else len(chosen)
     if needed is None or needed > most:
         few = solve_max_coverage(cover.problem, most, seed=seed, budget=_BUDGET)
         chosen = few.selected
         if source.colliding([heads[k] for k in chosen]) is not None:
             chosen = _apart(source, heads, cover, most)
-    whole, met = _greedy(cover)
-    greedy = len(whole) if met else None
-    return FoundHeads(heads, cover, chosen, needed, bound, proof, greedy)
+    return _Fewest(cover, chosen, needed, solution)
 
 
 def _fewest_apart(
@@ -265,23 +273,18 @@ def _greedy(
     `clear` says of a head that is taken which others may be taken yet.
     """
     rows, floors = cover.quotas.regions.row, cover.quotas.floors.astype(np.int64)
-    covers, served = cover.covers, np.zeros(len(cover.rows), dtype=bool)
-    chosen, free = list[int](), np.ones(covers.shape[1], dtype=bool)
-    begun = begin.tolist()
+    covers, chosen = cover.covers, begin.tolist()
+    served, free = covers[:, begin].any(axis=1), np.ones(covers.shape[1], dtype=bool)
+    if clear is not None:
+        for taken in chosen:
+            free = clear(taken)
     while True:
-        have = np.bincount(rows[served], minlength=len(floors))
-        short = floors - have
-        if begun:
-            best = begun.pop(0)
-        elif not (short > 0).any() or len(chosen) == most:
-            return np.sort(np.array(chosen, dtype=np.int64)), not (short > 0).any()
-        else:
-            wanted = ~served & (short > 0)[rows]
-            gains = np.where(free, covers[wanted].sum(axis=0), 0)
-            if not gains.any():
-                return np.sort(np.array(chosen, dtype=np.int64)), False
-            best = int(np.argmax(gains))
-        chosen.append(best)
-        served |= covers[:, best]
-        if clear is not None:
-            free &= clear(best)
+        short = floors - np.bincount(rows[served], minlength=len(floors))
+        met = not (short > 0).any()
+        wanted = ~served & (short > 0)[rows]
+        gains = np.where(free, covers[wanted].sum(axis=0), 0)
+        if met or len(chosen) == most or not gains.any():
+            return np.sort(np.array(chosen, dtype=np.int64)), met
+        chosen.append(int(np.argmax(gains)))
+        served |= covers[:, chosen[-1]]
+        free = free if clear is None else clear(chosen[-1])

@@ -98,27 +98,23 @@ class StepSearch:
         None: at most so many steps weren't found to be enough; are they refuted, the
         bound is above them.
         """
-        most, kept = min(most, self.sets.lattice.n_angles), self._kept(n_lamps, n_eyes)
+        kept = self._kept(n_lamps, n_eyes)
         if not kept:
             return None, most + 1
         least, refuted = self._least(n_lamps, most), True
         spent = _Spent()
         best: Steps | None = None
         for count in range(least, most + 1):
-            if best is not None and len(best.angles) < count:
-                break
-            found = self._at(kept, count, n_eyes, spent)
-            if found is not None:
+            if (found := self._at(kept, count, n_eyes, spent)) is not None:
                 best = found
                 break
             refuted &= not spent.cut
             if refuted:
                 least = count + 1
-            if spent.cut:
-                best = best or self._some(kept, n_eyes, most)
-                break
-            if best is None and spent.looked > _SOON:
+            if best is None and (spent.cut or spent.looked > _SOON):
                 best = self._some(kept, n_eyes, most)
+            if spent.cut or (best is not None and len(best.angles) <= count):
+                break
         if best is None:
             return None, least
         least = min(least, len(best.angles))

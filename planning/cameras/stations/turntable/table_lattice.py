@@ -112,7 +112,7 @@ class TableLattice:
     @property
     def stride(self) -> int:
         """How many places the table turns by from one angle to the next."""
-        return max(1, -(-_FREE // self.n_angles)) if self.n_angles < _FREE else 1
+        return -(-_FREE // self.n_angles)
 
     @property
     def n_places(self) -> int:
