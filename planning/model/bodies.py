@@ -236,9 +236,17 @@ class Obstacle:
     """A surface through which no light and no view passes: robot, table, clamp.
 
     Attributes:
-        name: As in the rig file.
+        name: As in the rig file; of one that stands still, with its step in brackets.
         mesh: Where it stands, in the world [m].
+        station: The step of a turntable at which the part sees it there: it is in the
+            way of devices of that step alone. Empty: it turns with the part.
     """
 
     name: str
     mesh: TriangleMesh
+    station: str = ""
+
+    @property
+    def rig_name(self) -> str:
+        """Its name in the rig file."""
+        return self.name.removesuffix(f" ({self.station})")

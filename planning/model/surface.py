@@ -41,6 +41,10 @@ _OBSTACLES: dict[str, tuple[str, tuple[int | str, ...]]] = {
     "obstacle_faces": ("iu", ("n", 3)),
     "obstacle_of_face": ("iu", ("n",)),
 }
+# Of each obstacle, where there are some that stand before one station alone.
+_STATIONS: dict[str, tuple[str, tuple[int | str, ...]]] = {
+    "obstacle_stations": ("U", ("n",)),
+}
 # Model of each reference pose, where the rig has several.
 _MODELS: dict[str, tuple[str, tuple[int | str, ...]]] = {
     "reference_projector_models": ("iu", ("n projectors",)),
@@ -172,16 +176,18 @@ class Surface:
                 wanted = _ARRAYS | (
                     _OBSTACLES if set(_OBSTACLES) & set(archive) else {}
                 )
-                wanted |= {name: of for name, of in _MODELS.items() if name in archive}
+                sometimes = _MODELS | _STATIONS
+                wanted |= {n: of for n, of in sometimes.items() if n in archive}
                 arrays = {name: archive[name] for name in wanted}
         except KeyError as error:
             raise PlanFileError(f"{path}: {error.args[0]}; plan again") from None
         except (OSError, ValueError, *_DAMAGED) as error:
             raise PlanFileError(f"{path}: not a readable .npz ({error})") from None
         try:
-            apart = ("vertices", "faces", *_OBSTACLES)
+            solids = (*_OBSTACLES, *_STATIONS)
+            apart = ("vertices", "faces", *solids)
             _check_arrays({name: arrays[name] for name in apart if name in arrays}, {})
-            obstacles = _unpacked(*(arrays.pop(name, None) for name in _OBSTACLES))
+            obstacles = _unpacked(*(arrays.pop(name, None) for name in solids))
             mesh = TriangleMesh(arrays.pop("vertices"), arrays.pop("faces"))
             return cls(mesh, **arrays, obstacles=obstacles)
         except (MeshError, PlanFileError) as error:
@@ -192,7 +198,7 @@ def _check_arrays(
     arrays: Mapping[str, NDArray[Any]], sizes: Mapping[int | str, int]
 ) -> None:
     for name, array in arrays.items():
-        kinds, shape = (_ARRAYS | _OBSTACLES | _MODELS)[name]
+        kinds, shape = (_ARRAYS | _OBSTACLES | _STATIONS | _MODELS)[name]
         wanted = [sizes.get(size, size) for size in shape]
         fits = array.ndim == len(wanted) and all(
             want in ("n", has) for want, has in zip(wanted, array.shape, strict=True)
@@ -208,7 +214,7 @@ def _check_arrays(
 
 
 def _packed(obstacles: Sequence[Obstacle]) -> dict[str, Any]:
-    """Return `_OBSTACLES` of obstacles; nothing of none."""
+    """Return `_OBSTACLES`, and `_STATIONS` if any has one; nothing of none."""
     if not obstacles:
         return {}
     meshes = [obstacle.mesh for obstacle in obstacles]
@@ -219,23 +225,34 @@ def _packed(obstacles: Sequence[Obstacle]) -> dict[str, Any]:
         together.faces,
         np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes]),
     )
-    return dict(zip(_OBSTACLES, values, strict=True))
+    packed: dict[str, Any] = dict(zip(_OBSTACLES, values, strict=True))
+    if any(obstacle.station for obstacle in obstacles):
+        packed["obstacle_stations"] = np.array([each.station for each in obstacles])
+    return packed
 
 
 def _unpacked(
-    names: NDArray[np.str_] | None, vertices: Array, faces: Ints, of_face: Ints
+    names: NDArray[np.str_] | None,
+    vertices: Array,
+    faces: Ints,
+    of_face: Ints,
+    stations: NDArray[np.str_] | None,
 ) -> tuple[Obstacle, ...]:
     """Return the obstacles that `_packed` took; None: there are none."""
     if names is None:
         return ()
     if not (len(of_face) == len(faces) and np.all(np.isin(of_face, range(len(names))))):
         raise MeshError("`obstacle_of_face` must name an obstacle for each face")
+    if stations is not None and len(stations) != len(names):
+        raise MeshError("`obstacle_stations` must name one for each obstacle, or none")
+    at = [""] * len(names) if stations is None else stations.tolist()
     obstacles: list[Obstacle] = []
     try:
         TriangleMesh(vertices, faces)
-        for index, name in enumerate(names.tolist()):
+        for index, (name, station) in enumerate(zip(names.tolist(), at, strict=True)):
             used, local = numbered(faces[of_face == index], len(vertices))
-            obstacles.append(Obstacle(name, TriangleMesh(vertices[used], local)))
+            mesh = TriangleMesh(vertices[used], local)
+            obstacles.append(Obstacle(name, mesh, station))
     except MeshError as error:
         raise MeshError(f"`obstacle_vertices` and `obstacle_faces`: {error}") from None
     return tuple(obstacles)

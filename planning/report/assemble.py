@@ -1,43 +1,37 @@
 """Turns a partial plan into a plan: poses rounded, every claim recomputed from them."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from planning.cameras.baselines.baseline_rows import baseline_rows
 from planning.cameras.baselines.seams import SampledSurface
-from planning.model.bodies import Obstacle
 from planning.model.document.certificates import Certificates
 from planning.model.document.device_records import BaselineRow
 from planning.model.document.input_records import EvaluationRecord
 from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
-from planning.model.surface import Surface
 from planning.report.advice.floor_relaxations import (
     with_floor_relaxations,
     with_small_floor,
 )
 from planning.report.advice.what_helps import with_fewer_needed, with_relaxations
 from planning.report.entries.overlaps import overlap_records
+from planning.report.entries.plan_entry import Told, document_of
 from planning.report.entries.range_entries import ranges_record, with_spread
 from planning.report.entries.station_entries import stations_record
+from planning.report.entries.surface_entry import surface_of
 from planning.report.entries.survival_entries import survival_record
 from planning.report.entries.violations import violations
 from planning.rings.ring_pitch import widest_gap
 from planning.scene.measured import widest_pixel
-from planning.scene.placed_bodies import Device
 from planning.scene.scene import Scene
 
 from .claims import Claims, make_claims
-from .document import Told, document_of
 from .entries import device_entries as entries
 from .judged import Devices
 from .marginal import marginal_records
-from .partial_plan import PartialPlan, Prepared
+from .partial_plan import PartialPlan
 
 # A point must be found within a ring gap, or so many pixels of the panel: at steps and
 # borders a decoder leaves some out.
@@ -69,7 +63,7 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
     stationed = partial.stationed
     moved = stationed is not None and stationed.record.kind != "heads"
     overlaps, schedule = overlap_records(among, devices.projectors, moved=moved)
-    surface = _surface(scene, devices, partial.ready)
+    surface = surface_of(scene, devices, partial.ready)
     requirements = _final_requirements(among, claims, devices)
     told = Told(
         requirements,
@@ -116,32 +110,6 @@ def _rounded_devices(partial: PartialPlan) -> Devices:
         tuple(entries.rounded_projector(p, "") for p in partial.stage.reference),
         tuple(entries.rounded_camera(c, "") for c in partial.camera_stage.reference),
     )
-
-
-def _surface(scene: Scene, devices: Devices, ready: Prepared) -> Surface:
-    reference, views = devices.reference_projectors, devices.reference_cameras
-    return Surface(
-        scene.mesh,
-        np.zeros(len(scene.mesh.faces), dtype=np.int64),
-        scene.region,
-        scene.steep,
-        np.stack([p.world_from_device for p in reference]),
-        np.stack([p.world_from_ring for p in reference]),
-        np.stack([c.world_from_device for c in views]),
-        tuple(Obstacle(solid.name, solid.mesh) for solid in scene.obstructions),
-        _models_of(reference, ready.templates),
-        _models_of(views, ready.cameras),
-    )
-
-
-def _models_of(
-    reference: Sequence[Device], templates: Sequence[Device]
-) -> NDArray[np.int64] | None:
-    """Model of each reference pose by its place; None where there is but one."""
-    if len(templates) == 1:
-        return None
-    place = {template.model: k for k, template in enumerate(templates)}
-    return np.array([place[device.model] for device in reference])
 
 
 def _final_requirements(scene: Scene, claims: Claims, devices: Devices) -> Requirements:

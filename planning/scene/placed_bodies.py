@@ -1,7 +1,9 @@
 """What light and views meet but the object: bodies of devices, and obstacles.
 
 A body blocks the beams and the views of every device but its own; an obstacle blocks
-all. Light leaves a point, or in parallel light the plane of the panel, and ends at the
+all. What stands at a station is in the way of devices of that station alone.
+
+Light leaves a point, or in parallel light the plane of the panel, and ends at the
 sample.
 """
 
@@ -47,6 +49,7 @@ class Obstruction:
     mesh: TriangleMesh
     contact_m: float
     threads: int | None = None
+    station: str = ""
 
     @classmethod
     def about(
@@ -55,16 +58,19 @@ class Obstruction:
         """Return what stands about an object."""
         low, high = mesh.bounds
         contact = _CONTACT * 0.5 * float(np.linalg.norm(high - low))
-        return tuple(cls(each.name, each.mesh, contact, threads) for each in obstacles)
+        return tuple(
+            cls(each.name, each.mesh, contact, threads, each.station)
+            for each in obstacles
+        )
 
     @property
     def words(self) -> str:
         """What messages call it."""
         return f"obstacle {self.name!r}"
 
-    def is_of(self, device: object) -> bool:
-        """Return False: no device owns it."""
-        return False
+    def concerns(self, device: Device) -> bool:
+        """Return whether it is in the way of a device: it stands where that does."""
+        return self.station in ("", device.station)
 
     def crossed(
         self, starts: NDArray[np.float64], points: NDArray[np.float64]
@@ -97,7 +103,7 @@ def touches_mesh(box: OrientedBox, mesh: TriangleMesh) -> bool:
 class PlacedBody:
     """A body in the world, with kind, pose and name (if it has one) of its device.
 
-    `stands` says whether the device stands already.
+    `stands` says whether the device stands already; `station` is the device's.
     """
 
     kind: str
@@ -105,6 +111,7 @@ class PlacedBody:
     box: OrientedBox
     name: str = ""
     stands: bool = False
+    station: str = ""
 
     @property
     def words(self) -> str:
@@ -116,6 +123,10 @@ class PlacedBody:
         return self.kind == kind_of(device) and np.array_equal(
             self.world_from_device, device.world_from_device
         )
+
+    def concerns(self, device: Device) -> bool:
+        """Return whether it is in a device's way: another's, that stands there too."""
+        return self.station in ("", device.station) and not self.is_of(device)
 
     def crossed(
         self, starts: NDArray[np.float64], points: NDArray[np.float64]
@@ -152,6 +163,7 @@ def bodies_of(devices: Iterable[Device]) -> tuple[PlacedBody, ...]:
             placed_box(device.body, device.world_from_device),
             device.id or device.existing,
             bool(device.existing),
+            device.station,
         )
         for device in devices
         if device.body is not None
@@ -205,7 +217,7 @@ def blocked_by(
 ) -> NDArray[np.bool_]:
     """Return what stands between a device and points, shape (n, n_bodies).
 
-    The device's own body never does.
+    The device's own body never does, nor what stands at another station.
     """
     blocked = np.zeros((len(points), len(bodies)), dtype=bool)
     if not bodies:
@@ -214,7 +226,7 @@ def blocked_by(
     local = transform(inverse(pose), points)
     starts = transform(pose, device.device.ray_starts(local))
     for column, body in enumerate(bodies):
-        if not body.is_of(device):
+        if body.concerns(device):
             blocked[:, column] = body.crossed(starts, points)
     return blocked
 
@@ -259,4 +271,4 @@ def collide(
             return False
         return not clearance_m or box_gap(box, body.box) < clearance_m
 
-    return [body for body in bodies if not body.is_of(device) and too_near(body)]
+    return [body for body in bodies if body.concerns(device) and too_near(body)]

@@ -91,6 +91,10 @@ class Scene:
         """Return the scene with another workspace."""
         return self._with(requirements=replace(self.requirements, workspace=workspace))
 
+    def with_obstructions(self, obstructions: tuple[Obstruction, ...]) -> "Scene":
+        """Return the scene with others standing about."""
+        return self._with(obstructions=obstructions)
+
     def _with(self, **changes: object) -> "Scene":
         other = replace(self, **changes)
         # What rays are cast against is the same mesh.

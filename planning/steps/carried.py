@@ -66,14 +66,9 @@ def check_carried(request: PlanRequest) -> None:
             f'steps = "free"'
         )
     models = [model for kind in bodies for model in rig.models(kind)]
-    housed = any(model.body for model in models)
     fastened = any(model.table.mount for model in models)
-    counted = any(model.table.count for model in models)
     unable = {
-        "what stands still in the light": bool(table and table.still),
-        "a body of devices": bool(table and housed),
         "a mount of devices": bool(table and fastened),
-        "a count of devices": bool(table and counted),
         "views": (wishes.views or 1) > 1,
         "survive": wishes.survive > 0,
         "robust": wishes.robust is not None,

@@ -1,11 +1,14 @@
 """A plan of devices before a turntable, from their places to what is written."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
 from geometry.arrays import Array
+from geometry.mesh.mesh import TriangleMesh
+from geometry.poses import transform
 from planning.cameras.stations.heads.head_poses import PlacedHead
 from planning.cameras.stations.heads.head_stage import stages_of
 from planning.cameras.stations.turntable.fewest_steps import (
@@ -18,6 +21,7 @@ from planning.cameras.stations.turntable.table_lattice import (
     about_axis,
     off_axis_m,
 )
+from planning.cameras.stations.turntable.table_room import TableRoom, room_of
 from planning.cameras.stations.turntable.table_sets import TableSets
 from planning.model.device_poses import moved_to
 from planning.model.document.station_records import (
@@ -32,6 +36,7 @@ from planning.model.progress import Stopwatch
 from planning.model.words import count_words
 from planning.report.partial_plan import PartialPlan, PlanRequest, Prepared
 from planning.scene.draws import DRAWS
+from planning.scene.placed_bodies import Obstruction
 from planning.scene.scene import Scene
 
 from .best_kept import Search
@@ -69,8 +74,11 @@ def steps_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
     scene = ready.scene.within(about_axis(space, table))
     lattice = TableLattice.about(table, space, ready.templates, ready.cameras)
     with clock.stage("turntable", "turntable: what pairs measure at every angle"):
-        sets = TableSets.of(scene, lattice, scene.target_samples(DRAWS.cameras))
-    search = StepSearch.of(scene, sets)
+        target = scene.target_samples(DRAWS.cameras)
+        room = room_of(scene, lattice, target.samples.points)
+        scene = room.scene
+        sets = TableSets.of(scene, lattice, target)
+    search = StepSearch.of(scene, sets, room)
     most = min(table.max_steps or lattice.n_angles, lattice.n_angles)
     partial, first, traded = None, None, _Traded((), {})
     for traded in _trades(search, request, most, clock):
@@ -79,7 +87,7 @@ def steps_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
             partial = _placed(ready, search, traded, first, clock)
             yield partial, False
     if partial is None or first is None:
-        raise InfeasibleLimitsError(_too_little(request, traded, lattice, most))
+        raise InfeasibleLimitsError(_too_little(request, traded, room, most))
     taken, found = first, traded.found
     if request.wishes.max_cameras is not None:
         taken = min(found, key=lambda pair: (len(found[pair].angles), sum(pair)))
@@ -93,7 +101,7 @@ def steps_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
         if not any(short_of(plan)):
             return
         clock.say("  fresh samples fall short: more is asked of the others")
-        asked = StepSearch.of(_asking_more(scene, spare), sets)
+        asked = StepSearch.of(_asking_more(scene, spare), sets, room)
         steps, _ = asked.fewest(*taken, most)
         if steps is not None:
             partial = _placed(ready, search, traded, taken, clock, steps)
@@ -101,30 +109,36 @@ def steps_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
 
 
 def _too_little(
-    request: PlanRequest, traded: _Traded, lattice: TableLattice, most: int
+    request: PlanRequest, traded: _Traded, room: TableRoom, most: int
 ) -> str:
     """Say that the devices allowed don't do, how far that is known, and what may."""
     lamps, eyes = _counts(request)
     devices = f"{count_words(lamps, 'projector')} and {count_words(eyes, 'camera')}"
     angles = count_words(most, "angle")
     refuted = all(row.lower_bound > most for row in traded.rows)
+    lattice, far = room.lattice, ""
     beside = off_axis_m(lattice.table, lattice.space)
-    far = ""
     if beside > lattice.space.object_radius_m:
         far = f"; the axis runs {1e3 * beside:.0f} mm beside the middle of the part"
     if refuted:
         said = f"{devices} measure too little of the part at {angles} of the table"
     else:
         said = f"no places of {devices} were found that measure enough at {angles}"
-    return f"{said}{far}; allow more devices or steps, or another axis"
+    still = ", ".join(repr(solid.name) for solid in room.still)
+    moved = f", or move what stands still: {still}" if still else ""
+    return f"{said}{far}; allow more devices or steps, or another axis{moved}"
 
 
 def _counts(request: PlanRequest) -> tuple[int, int]:
     """Numbers of projectors and cameras that steps are looked for, at most."""
-    wishes = request.wishes
+    wishes, there = request.wishes, request.rig.models
+    stock = [
+        sum(model.table.count or np.inf for model in there(kind))
+        for kind in ("projector", "camera")
+    ]
     return (
-        min(wishes.max_projectors, _MOST_LAMPS),
-        min(wishes.max_cameras or _MOST_EYES, _MOST_EYES),
+        int(min(wishes.max_projectors, _MOST_LAMPS, stock[0])),
+        int(min(wishes.max_cameras or _MOST_EYES, _MOST_EYES, stock[1])),
     )
 
 
@@ -198,6 +212,9 @@ def _placed(
             max_cameras=len(placements) * len(room.cameras),
         ),
     )
+    scene = scene.with_obstructions(
+        (*scene.obstructions, *_seen_still(search.room, placements))
+    )
     with clock.stage("turntable", "turntable: what the devices light and measure"):
         lights, views = stages_of(scene, planned, [_everything(lattice)])
     record = StationsRecord(
@@ -235,6 +252,17 @@ def _turned(room: PlacedHead, back: Array) -> PlacedHead:
         tuple(moved_to(p, back @ p.world_from_device) for p in room.projectors),
         tuple(moved_to(c, back @ c.world_from_device) for c in room.cameras),
     )
+
+
+def _seen_still(
+    room: TableRoom, placements: Sequence[Placement]
+) -> Iterator[Obstruction]:
+    """What stands still as the part sees it at each step."""
+    for solid, step in product(room.still, placements):
+        back = step.world_from_station
+        mesh = TriangleMesh(transform(back, solid.mesh.vertices), solid.mesh.faces)
+        name = f"{solid.name} ({step.id})"
+        yield replace(solid, name=name, mesh=mesh, station=step.id)
 
 
 def _everything(lattice: TableLattice) -> PlacedHead:

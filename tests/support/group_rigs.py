@@ -28,7 +28,7 @@ _HEAD: dict[str, Any] = {
         {"name": "r", "position_mm": [160.0, 0.0, 0.0], "aim_mm": [0.0, 0.0, 600.0]},
     ],
 }
-_DEVICES: dict[str, Any] = {
+DEVICES: dict[str, Any] = {
     "projector": {"name": "lamp", **_LENS, **_SHARP},
     "camera": {"name": "eye", **_LENS, **_SHARP},
     "limits": {"max_sigma_mm": 1.0},
@@ -40,14 +40,14 @@ _TABLE = {"point_mm": [0.0, 0.0, 0.0], "axis": [0.0, 0.0, 1.0], "steps": 8}
 
 def head_rig(*, head: dict[str, Any] | None = None, **tables: Any) -> Rig:
     """A rig with one head of a projector between two cameras."""
-    written = copy.deepcopy(_DEVICES | {"name": "heads", "head": _HEAD}) | tables
+    written = copy.deepcopy(DEVICES | {"name": "heads", "head": _HEAD}) | tables
     written["head"] |= head or {}
     return load_rig(written)
 
 
 def table_rig(*, table: dict[str, Any] | None = None, **tables: Any) -> Rig:
     """A rig with a turntable of eight angles."""
-    written = copy.deepcopy(_DEVICES | {"name": "table", "turntable": _TABLE}) | tables
+    written = copy.deepcopy(DEVICES | {"name": "table", "turntable": _TABLE}) | tables
     written["turntable"] |= table or {}
     return load_rig(written)
 

@@ -24,16 +24,33 @@ class _Lattice:
     offsets = np.array([-1, 0, 1])
     projectors = cameras = (None,) * CIRCLES
 
-    def __init__(self, room=None, stride=1):
-        self.room = np.ones(ANGLES, dtype=bool) if room is None else room
+    def __init__(self, stride=1):
         self.stride, self.n_angles = stride, ANGLES // stride
 
-    def begins(self, devices):
-        free = [np.roll(self.room, -place) for _, place in devices]
+
+class _Room:
+    """Places that are free, and what stands still between a place and samples."""
+
+    def __init__(self, room=None, hidden=None):
+        self.room = np.ones(ANGLES, dtype=bool) if room is None else room
+        self.hidden, self.is_empty = hidden, hidden is None
+
+    def begins(self, lamps, eyes):
+        free = [np.roll(self.room, -place) for _, place in (*lamps, *eyes)]
         return np.flatnonzero(np.all(free, axis=0))
 
+    def clear(self, lamps, eyes, angles, begins):
+        kinds = [*((0, lamp) for lamp in lamps), *((1, eye) for eye in eyes)]
+        for by in begins:
+            clear = np.zeros((len(kinds), ANGLES, N), dtype=bool)
+            for d, (kind, (circle, place)) in enumerate(kinds):
+                for angle in angles:
+                    at = (place + by) % ANGLES, (angle + by) % ANGLES
+                    clear[d, angle] = ~self.hidden[kind, circle, *at]
+            yield clear
 
-def _search(seed, *, room=None, coverage=0.8, stride=1):
+
+def _search(seed, *, room=None, coverage=0.8, stride=1, hidden=0.0):
     rng = np.random.default_rng(seed)
     lit = rng.random((CIRCLES, ANGLES, N)) < 0.5
     measured = rng.random((CIRCLES, ANGLES, CIRCLES, 3, N)) < 0.6
@@ -44,21 +61,25 @@ def _search(seed, *, room=None, coverage=0.8, stride=1):
         dominant_coverage=0.6, coverage=coverage, region_coverage=0.0
     )
     scene = SimpleNamespace(requirements=required, seed=0, check_cancelled=lambda: None)
-    return StepSearch.of(
-        scene, TableSets(_Lattice(room, stride), target, lit, measured)
-    )
+    solid = rng.random((2, CIRCLES, ANGLES, ANGLES, N)) < hidden if hidden else None
+    sets = TableSets(_Lattice(stride), target, lit, measured)
+    return StepSearch.of(scene, sets, _Room(room, solid))
 
 
 def _enough(search, lamps, eyes, angles):
     """By the tensors alone: what any pair does at any of the angles."""
-    sets, lattice = search.sets, search.sets.lattice
+    sets, lattice, hidden = search.sets, search.sets.lattice, search.room.hidden
+    if hidden is None:
+        hidden = np.zeros((2, CIRCLES, ANGLES, ANGLES, N), dtype=bool)
     lit, measured = np.zeros((2, N), dtype=bool)
     for j, (e, i) in product(angles, lamps):
-        lit |= sets.lit[e, (i - j) % ANGLES]
+        reached = ~hidden[0, e, i, j]
+        lit |= sets.lit[e, (i - j) % ANGLES] & reached
         for f, k in eyes:
             apart = (k - i + ANGLES // 2) % ANGLES - ANGLES // 2
             for column in np.flatnonzero(lattice.offsets == apart):
-                measured |= sets.measured[e, (i - j) % ANGLES, f, column]
+                both = reached & ~hidden[1, f, k, j]
+                measured |= sets.measured[e, (i - j) % ANGLES, f, column] & both
     asked = search.cover.asked
     return lit.sum() >= asked[0] and measured.sum() >= asked[1]
 
@@ -70,8 +91,7 @@ def _brute(search, n_lamps, n_eyes):
     for count in range(1, lattice.n_angles + 1):
         for lamps in combinations(places, n_lamps):
             for eyes in combinations(places, n_eyes):
-                devices = [(None, place) for _, place in (*lamps, *eyes)]
-                if 0 not in lattice.begins(devices):
+                if 0 not in search.room.begins(lamps, eyes):
                     continue
                 for angles in combinations(every, count):
                     if _enough(search, lamps, eyes, angles):
@@ -132,6 +152,20 @@ def test_devices_stand_where_the_room_lets_them():
     assert all(room[place] for _, place in (*steps.lamps, *steps.eyes))
     assert _enough(search, steps.lamps, steps.eyes, steps.angles)
     assert len(steps.angles) == _brute(search, 1, 1)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(("n_lamps", "n_eyes"), [(1, 1), (1, 2), (2, 1)])
+def test_what_stands_still_is_in_the_way_at_each_angle_anew(seed, n_lamps, n_eyes):
+    """Then it isn't the same where devices begin, and every beginning is looked at."""
+    search = _search(seed, coverage=0.6, hidden=0.15)
+    steps, least = search.fewest(n_lamps, n_eyes, ANGLES)
+    truth = _brute(search, n_lamps, n_eyes)
+    if truth is None:
+        assert steps is None
+        return
+    assert len(steps.angles) == truth == least
+    assert _enough(search, steps.lamps, steps.eyes, steps.angles)
 
 
 def test_fewer_steps_than_it_takes_are_none_and_the_bound_says_so():

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.group_rigs import egg, planned, table_rig
+from support.group_rigs import DEVICES, egg, planned, table_rig
 
+from geometry.mesh.mesh import TriangleMesh
 from planning.cameras.stations.heads.head_cover import HeadSets
 from planning.cameras.stations.heads.head_poses import PlacedHead
 from planning.cameras.stations.turntable import table_lattice
@@ -16,12 +17,21 @@ from planning.model.errors import InfeasibleLimitsError, InputError, PlanFileErr
 from planning.scene.draws import DRAWS
 from planning.steps.prepare import prepared
 from planning.verify.audit.audit import audit_plan
+from planning.verify.verification import verify_plan
 
-_WALL = {
-    "name": "wall",
-    "centre_mm": [0.0, 900.0, 0.0],
-    "size_mm": [900.0, 100.0, 900.0],
+_POST = {
+    "name": "post",
+    "shape": "box",
+    "centre_mm": [250.0, 0.0, 0.0],
+    "size_mm": [20.0, 160.0, 600.0],
 }
+_CLAMP = {
+    "name": "clamp",
+    "shape": "box",
+    "centre_mm": [0.0, 0.0, -100.0],
+    "size_mm": [30.0, 30.0, 30.0],
+}
+_BODY = {"size_mm": [80.0, 60.0, 120.0], "centre_mm": [0.0, 0.0, -40.0]}
 
 
 @pytest.fixture(scope="module")
@@ -37,6 +47,115 @@ def few(with_little_work):
 def plan(few):
     rig = table_rig(table={"point_mm": [12.0, -7.0, 0.0]})
     return planned(rig, max_projectors=2, max_cameras=2, coverage=0.85)
+
+
+@pytest.fixture(scope="module")
+def among(few):
+    """A plan among a post that stands, a clamp that turns, and housings."""
+    housed = {kind: DEVICES[kind] | {"body": _BODY} for kind in ("projector", "camera")}
+    around = [
+        _POST
+        | {
+            "name": f"post {k}",
+            "centre_mm": [
+                250.0 * np.cos(k * np.pi / 3.0),
+                250.0 * np.sin(k * np.pi / 3.0),
+                0.0,
+            ],
+            "turn_deg": [0.0, 0.0, 60.0 * k],
+            "size_mm": [20.0, 60.0, 600.0],
+        }
+        for k in range(3)
+    ]
+    rig = table_rig(
+        table={"still": [post["name"] for post in around], "point_mm": [9.0, 4.0, 0.0]},
+        obstacle=[_CLAMP, *around],
+        **housed,
+    )
+    asked = {"coverage": 0.7, "dominant_coverage": 0.8}
+    return planned(rig, max_projectors=1, max_cameras=2, **asked)
+
+
+def test_what_stands_still_is_seen_turned_back_at_each_step(among):
+    solids = {o.name: o for o in among.surface.obstacles}
+    told = among.document.stations
+    assert solids["clamp"].station == ""
+    assert len(solids) == 1 + 3 * len(told.stations)
+    for one in told.stations:
+        solid = solids[f"post 2 ({one.id})"]
+        assert (solid.station, solid.rig_name) == (one.id, "post 2")
+        # Its azimuth about the axis is that of the room, less the angle.
+        away = solid.mesh.vertices.mean(axis=0) - np.array(told.point_m)
+        azimuth = 2.0 * np.pi / 3.0
+        offset = 0.25 * np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+        there = among.requirements.workspace.centre + offset
+        truth = there - np.array(told.point_m)
+        turn = np.arctan2(away[1], away[0]) - np.arctan2(truth[1], truth[0])
+        assert np.exp(1j * turn) == pytest.approx(np.exp(-1j * one.angle), abs=1e-6)
+
+
+def test_the_audit_and_pixels_bear_out_a_plan_among_posts_and_housings(among):
+    found = verify_plan(among, threads=1)
+    assert found.passed, found.summary()
+    wider = verify_plan(among, truth=_wider_at_first(among), threads=1)
+    missing = [
+        result.reconstruction.completeness.predicted_missing
+        for result in (found, wider)
+    ]
+    assert missing[0] < 0.01 < missing[1]
+
+
+@pytest.mark.parametrize(
+    ("where", "told"),
+    [
+        ({"centre_mm": [250.0, 40.0, 0.0]}, "differs from the rig's"),
+        ({"name": "pillar"}, "the rig states"),
+    ],
+)
+def test_a_post_elsewhere_than_the_rig_has_it_is_found(among, handmade, where, told):
+    lie = handmade.tampered(
+        among, lambda document: document["rig"]["obstacle"][1].update(where)
+    )
+    failures = audit_plan(lie, n_samples=1000).failures
+    assert any(told in failure for failure in failures)
+
+
+def test_a_post_that_the_plan_forgot_shows_in_its_areas(among):
+    """The audit's own rays meet it: areas claimed without it are false."""
+    failures = audit_plan(_wider_at_first(among), n_samples=5000).failures
+    assert any("lit_area_m2" in failure for failure in failures)
+
+
+def _wider_at_first(plan):
+    """The plan, but what stands still is wider at the first step."""
+    solids = tuple(
+        replace(o, mesh=_wider(o.mesh)) if o.station == "T1" else o
+        for o in plan.surface.obstacles
+    )
+    return replace(plan, surface=replace(plan.surface, obstacles=solids))
+
+
+def _wider(mesh):
+    """The same solid, grown a good deal about its middle."""
+    middle = mesh.vertices.mean(axis=0)
+    return TriangleMesh(middle + 8.0 * (mesh.vertices - middle), mesh.faces)
+
+
+def test_few_of_a_model_are_before_the_table_at_once(few):
+    counted = DEVICES["camera"] | {"count": 1}
+    rig = table_rig(camera=counted)
+    plan = planned(rig, max_projectors=1, max_cameras=3, coverage=0.7)
+    assert {len(one.cameras) for one in plan.document.stations.stations} == {1}
+    assert {(r.projectors, r.cameras) for r in plan.document.stations.steps} == {(1, 1)}
+    assert audit_plan(plan, n_samples=1000).failures == ()
+
+
+def test_a_housing_that_the_part_would_hit_at_some_angle_has_no_room(few):
+    """A long part turns through where the housing reaches, at angles not used, too."""
+    deep = {"size_mm": [80.0, 60.0, 1300.0], "centre_mm": [0.0, 0.0, 0.0]}
+    rig = table_rig(camera=DEVICES["camera"] | {"body": deep})
+    with pytest.raises(InfeasibleLimitsError, match="1 projector and 1 camera"):
+        planned(rig, max_projectors=1, max_cameras=1, coverage=0.3)
 
 
 def test_devices_of_a_step_are_those_of_the_room_turned_back(plan):
@@ -180,7 +299,7 @@ def test_too_few_devices_are_told_with_the_angles(few):
         ({}, {"max_heads": 2}, r"no \[head\]"),
         ({}, {"pattern": "rings"}, "dense"),
         ({}, {"survive": 1}, "survive"),
-        ({"workspace": {"keep_out": [_WALL]}}, {}, "stands still"),
+        ({"camera": DEVICES["camera"] | {"mount": {"pan_step_deg": 5.0}}}, {}, "mount"),
     ],
 )
 def test_what_cannot_be_asked_of_a_turntable_is_told_in_one_line(tables, asked, told):

@@ -17,6 +17,8 @@ _COLOURS: dict[str, Colour] = {
     "projector": (200, 80, 0),
 }
 _LEAST_PX = 240
+# Of the line above the bar; where it has no room in the smallest it goes without terms.
+_SIZES = (13.0, 11.5, 10.0)
 
 
 def draw_error_bar(
@@ -35,8 +37,14 @@ def draw_error_bar(
         return
     middle = top + 0.52 * (bottom - top)
     each = ", ".join(f"{name} {1e3 * value:.3f}" for name, value in terms.items())
-    text = f"sigma {1e3 * whole**0.5:.3f} mm rms: {each}"
-    draw.text((left, middle - 3 * SUPERSAMPLING), text, PALE, font(13.0), "ld")
+    text = f"sigma {1e3 * whole**0.5:.3f} mm rms"
+    for size in _SIZES:
+        if draw.textlength(f"{text}: {each}", font(size)) <= right - left:
+            text = f"{text}: {each}"
+            break
+    else:
+        size = _SIZES[0]
+    draw.text((left, middle - 3 * SUPERSAMPLING), text, PALE, font(size), "ld")
     for name, value in terms.items():
         end = left + (right - box[0]) * value**2 / whole
         draw.rectangle((left, middle, end, bottom), fill=_COLOURS.get(name, INK))

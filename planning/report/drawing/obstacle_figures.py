@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.topology import face_pairs
+from planning.model.bodies import Obstacle
 from planning.model.plan import RigPlan
 
 from .panel import Panel
@@ -45,23 +46,33 @@ class ObstacleFigure:
         return self.mesh.vertices[edges.ends[drawn]]
 
 
+def drawn_obstacles(plan: RigPlan) -> list[Obstacle]:
+    """Return the obstacles that are shown, those that stand still at the first step.
+
+    Not zones that block, which are shown as zones.
+    """
+    told = plan.document.stations
+    first = told.stations[0].id if told is not None and told.stations else ""
+    here = [o for o in plan.surface.obstacles if o.station in ("", first)]
+    # Zones come after them, perhaps under the same names.
+    return here[: len(plan.document.rig.obstacle)]
+
+
 def obstacle_figures(plan: RigPlan, reach_m: float) -> list[ObstacleFigure]:
-    """Return what is drawn of a plan's obstacles; zones that block are drawn as zones.
+    """Return what is drawn of a plan's obstacles.
 
     Args:
         plan: The plan.
         reach_m: The picture follows them no farther from the workspace's centre.
     """
     centre = np.array(plan.requirements.workspace.centre)
-    # Zones come after them, perhaps under the same names.
-    n = len(plan.document.rig.obstacle)
     return [
         ObstacleFigure(
             solid.name,
             solid.mesh,
             centre + np.clip(solid.mesh.vertices - centre, -reach_m, reach_m),
         )
-        for solid in plan.surface.obstacles[:n]
+        for solid in drawn_obstacles(plan)
     ]
 
 

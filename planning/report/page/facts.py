@@ -11,6 +11,7 @@ from geometry.devices import PinholeModel
 from planning.model.bodies import Box
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.report.drawing.obstacle_figures import drawn_obstacles
 from planning.rings.acquisition import n_frames
 from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.predicates.predicates import (
@@ -148,10 +149,9 @@ def _zones(plan: RigPlan) -> list[dict[str, Any]]:
 
 
 def _obstacles(plan: RigPlan, payload: Payload) -> list[dict[str, Any]]:
-    """Add their meshes; zones that block, which come last, are shown as zones."""
+    """Add the meshes of those that are shown."""
     found: list[dict[str, Any]] = []
-    n = len(plan.document.rig.obstacle)
-    for k, solid in enumerate(plan.surface.obstacles[:n]):
+    for k, solid in enumerate(drawn_obstacles(plan)):
         name = f"obstacle{k}"
         box = add_mesh(payload, name, solid.mesh.vertices, solid.mesh.faces)
         found.append({"name": solid.name, "array": name} | box)

@@ -19,7 +19,7 @@ def zone_lines(plan: RigPlan) -> list[str]:
     space = plan.requirements.workspace
     centre = np.array(space.centre)
     low, high = plan.surface.mesh.bounds
-    solid = {obstacle.name for obstacle in plan.surface.obstacles}
+    solid = {obstacle.rig_name for obstacle in plan.surface.obstacles}
     room = "" if space.box is None else _box(space.box, centre)
     return [
         "in the axes of the mesh file, in millimetres:",

@@ -3,25 +3,21 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from planning.cameras.baselines.baseline_rows import baseline_rows
 from planning.cameras.baselines.seams import SampledSurface
 from planning.cameras.photogrammetry.best_pairs import widest_sample
 from planning.cameras.photogrammetry.measured_views import measured_views
 from planning.cameras.photogrammetry.view_stage import ViewStage
-from planning.model.bodies import Obstacle
 from planning.model.document.certificates import Certificates
 from planning.model.document.coverage_records import CameraMarginal
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
-from planning.model.surface import Surface
 from planning.report.claims import Claims
-from planning.report.document import Told, document_of
 from planning.report.entries import device_entries as entries
+from planning.report.entries.plan_entry import Told, document_of
+from planning.report.entries.surface_entry import surface_of
 from planning.report.judged import Devices
 from planning.report.partial_plan import PlanRequest, Prepared
 from planning.scene.draws import DRAWS
@@ -81,7 +77,7 @@ def write_view_plan(partial: ViewPlan, clock: Stopwatch) -> RigPlan:
         _certificates(partial),
         tuple(baselines),
     )
-    surface = _surface(scene, devices)
+    surface = surface_of(scene, devices, partial.ready)
     document = document_of(
         *(partial.ready, surface, claims, told, clock),
         truncated=partial.truncated,
@@ -99,20 +95,6 @@ def _rounded_devices(partial: ViewPlan) -> Devices:
         tuple(entries.rounded_camera(camera, name) for camera, name in cameras),
         (),
         tuple(entries.rounded_camera(c, "") for c in partial.stage.reference),
-    )
-
-
-def _surface(scene: Scene, devices: Devices) -> Surface:
-    none: NDArray[np.float64] = np.zeros((0, 4, 4))
-    return Surface(
-        scene.mesh,
-        np.zeros(len(scene.mesh.faces), dtype=np.int64),
-        scene.region,
-        scene.steep,
-        none,
-        none,
-        np.stack([c.world_from_device for c in devices.reference_cameras]),
-        tuple(Obstacle(solid.name, solid.mesh) for solid in scene.obstructions),
     )
 
 

@@ -17,7 +17,6 @@ from planning.verify.audit.counts.overlap_claims import (
     audit_overlaps,
     audit_schedule,
 )
-from planning.verify.audit.counts.station_claims import audit_stations
 from planning.verify.audit.counts.table_claims import (
     audit_limits,
     audit_scales,
@@ -48,6 +47,7 @@ from planning.verify.audit.devices.workspace_claims import audit_workspace
 from planning.verify.audit.devices.zone_claims import audit_zones
 from planning.verify.audit.rings.axis_claims import audit_ring_axes
 from planning.verify.audit.rings.ring_claims import audit_rings
+from planning.verify.audit.stations.station_claims import audit_stations
 
 from .audit_case import AuditCase, examine
 from .audit_findings import AuditFindings

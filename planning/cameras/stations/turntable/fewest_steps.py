@@ -19,8 +19,7 @@ from itertools import combinations_with_replacement, product
 import numpy as np
 
 from geometry.arrays import Ints
-from planning.cameras.stations.heads.head_cover import HeadCover
-from planning.scene.placed_bodies import Device
+from planning.cameras.stations.heads.head_cover import HeadCover, HeadSets
 from planning.scene.scene import Scene
 from solvers import solve_cover
 
@@ -33,6 +32,7 @@ from .sample_bits import (
     rows_together,
     subsets,
 )
+from .table_room import TableRoom
 from .table_sets import Place, TableSets
 
 _BUDGET = 2e8
@@ -80,17 +80,19 @@ class StepSearch:
     Attributes:
         scene: What is asked.
         sets: What pairs of places do.
+        room: What stands about the table.
         cover: What is asked, as rows; its sets are those of everything.
     """
 
     scene: Scene
     sets: TableSets
+    room: TableRoom
     cover: HeadCover
 
     @classmethod
-    def of(cls, scene: Scene, sets: TableSets) -> "StepSearch":
+    def of(cls, scene: Scene, sets: TableSets, room: TableRoom) -> "StepSearch":
         """Return the search for what a scene asks."""
-        return cls(scene, sets, HeadCover.of(scene, sets.everywhere()))
+        return cls(scene, sets, room, HeadCover.of(scene, sets.everywhere()))
 
     def fewest(self, n_lamps: int, n_eyes: int, most: int) -> tuple[Steps | None, int]:
         """Return the fewest steps of one or two projectors, and what is proved of them.
@@ -156,16 +158,18 @@ class StepSearch:
             self.scene.check_cancelled()
             near, bits = self._measured(lamps, angles)
             eyes = tuple(near[k] for k in rows_of_most(bits, n_eyes))
-            sets = self.sets.steps_of(lamps, eyes).take(angles)
-            cover = replace(self.cover, sets=sets)
-            if len(eyes) < n_eyes or cover.lacking(np.arange(len(angles))):
+            if len(eyes) < n_eyes:
                 continue
-            few = solve_cover(cover.problem, seed=self.scene.seed, budget=_BUDGET)
-            steps = self._stands(lamps, eyes, angles[few.selected])
-            if steps is None or len(few.selected) > most:
-                continue
-            if best is None or len(steps.angles) < len(best.angles):
-                best = steps
+            for _, sets in self._standing(lamps, eyes, angles):
+                cover = replace(self.cover, sets=sets.take(angles))
+                if cover.lacking(np.arange(len(angles))):
+                    continue
+                few = solve_cover(cover.problem, seed=self.scene.seed, budget=_BUDGET)
+                steps = self._stands(lamps, eyes, angles[few.selected])
+                if steps is None or len(few.selected) > most:
+                    continue
+                if best is None or len(steps.angles) < len(best.angles):
+                    best = steps
         return best
 
     def _least(self, n_lamps: int, most: int) -> int:
@@ -201,6 +205,10 @@ class StepSearch:
                     eyes = tuple(near[k] for k in chosen)
                     if (found := self._stands(lamps, eyes, row)) is not None:
                         return found
+                    # What is in the way is looked at for each choice anew.
+                    spent.tried += not self.room.is_empty
+                    if spent.tried >= _TRIED:
+                        break
                 if spent.tried >= _TRIED:
                     break
             if spent.looked >= _ALL or spent.tried >= _TRIED:
@@ -266,27 +274,37 @@ class StepSearch:
         self, lamps: tuple[Place, ...], eyes: tuple[Place, ...], angles: Ints
     ) -> Steps | None:
         """Places in the room, if it holds them and floors of regions are met, too."""
-        lattice = self.sets.lattice
-        devices: list[tuple[Device, int]] = [
-            *((lattice.projectors[e], i) for e, i in lamps),
-            *((lattice.cameras[f], k) for f, k in eyes),
-        ]
-        begins = lattice.begins(devices)
-        # The table can turn by its own angles only.
-        begins = begins[(begins + angles[0]) % lattice.stride == 0]
-        cover = replace(self.cover, sets=self.sets.steps_of(lamps, eyes))
-        if not len(begins) or cover.lacking(angles):
+        cover, n = self.cover, self.sets.lattice.n_places
+        if replace(cover, sets=self.sets.steps_of(lamps, eyes)).lacking(angles):
             return None
-        # Devices that stand by so much further on see the same at angles as much on.
-        from_zero = np.isin(begins, -angles % lattice.n_places)
-        by = int(begins[np.argmax(from_zero)])
-        return Steps(
-            _moved(lamps, by, lattice.n_places),
-            _moved(eyes, by, lattice.n_places),
-            np.sort((angles + by) % lattice.n_places),
-            1,
-            "",
-        )
+        for by, sets in self._standing(lamps, eyes, angles):
+            if replace(cover, sets=sets).lacking(angles):
+                continue
+            # Devices that stand by so much further on see the same as much later.
+            places = _moved(lamps, by, n), _moved(eyes, by, n)
+            return Steps(*places, np.sort((angles + by) % n), 1, "")
+        return None
+
+    def _standing(
+        self, lamps: tuple[Place, ...], eyes: tuple[Place, ...], angles: Ints
+    ) -> Iterator[tuple[int, HeadSets]]:
+        """Yield by how many places devices may be moved on, and what they do there.
+
+        Angles count from before the move; where angle 0 is among them comes first. With
+        nothing in the way of light it is the same everywhere, and told once.
+        """
+        begins = self.room.begins(lamps, eyes)
+        # The table can turn by its own angles only.
+        begins = begins[(begins + angles[0]) % self.sets.lattice.stride == 0]
+        from_zero = np.isin(begins, -angles % self.sets.lattice.n_places)
+        begins = begins[np.argsort(~from_zero, kind="stable")]
+        if self.room.is_empty:
+            for by in begins[:1].tolist():
+                yield by, self.sets.steps_of(lamps, eyes)
+            return
+        every = self.room.clear(lamps, eyes, angles, begins)
+        for by, clear in zip(begins.tolist(), every, strict=True):
+            yield by, self.sets.steps_of(lamps, eyes, clear)
 
     @cached_property
     def _circles(self) -> list[Circle]:

@@ -159,14 +159,6 @@ class TableLattice:
         offsets = places - np.array(self.space.centre)
         return admissible(self.space, (low - play, high + play), offsets)
 
-    def begins(self, devices: Sequence[tuple[Device, int]]) -> Ints:
-        """Return by how many places devices may be moved on to stand in the room all.
-
-        Each is at a place.
-        """
-        free = [np.roll(self.room(device), -place) for device, place in devices]
-        return np.flatnonzero(np.all(free, axis=0))
-
     def _shell(self, device: Device) -> Range:
         lights = isinstance(device, PlannedProjector)
         space = self.space

@@ -70,25 +70,31 @@ class TableSets:
         return HeadSets(self.target, lit.T, measured.T)
 
     def steps_of(
-        self, lamps: Sequence[Place], eyes: Sequence[Place] | None
+        self,
+        lamps: Sequence[Place],
+        eyes: Sequence[Place] | None,
+        clear: Mask | None = None,
     ) -> HeadSets:
         """Return what devices do at each angle of the table, (n, A).
 
-        At angle j they are seen j places back. Cameras None: any.
+        At angle j they are seen j places back. Cameras None: any. Where a line to a
+        sample isn't `clear`, as `TableRoom.clear` says, a device does nothing.
         """
         places, n = self.lattice.n_places, len(self.target)
         back = -np.arange(places)
+        if clear is None:
+            clear = np.ones((len(lamps) + len(eyes or ()), 1, 1), dtype=bool)
         lit, measured = np.zeros((2, places, n), dtype=bool)
-        for e, i in lamps:
+        for (e, i), free in zip(lamps, clear, strict=False):
             at = (i + back) % places
-            lit |= self.lit[e, at]
+            lit |= self.lit[e, at] & free
             if eyes is None:
                 measured |= self.measured[e, at].any(axis=(1, 2))
                 continue
-            for f, k in eyes:
+            for (f, k), in_view in zip(eyes, clear[len(lamps) :], strict=True):
                 column = self._offset(k - i)
                 if column is not None:
-                    measured |= self.measured[e, at, f, column]
+                    measured |= self.measured[e, at, f, column] & free & in_view
         return HeadSets(self.target, lit.T, measured.T)
 
     def near(self, lamp: Place) -> list[Place]:

@@ -81,7 +81,9 @@ def light_falls(
     chosen = np.flatnonzero(falls)
     way = samples.points[chosen], along[chosen], length[chosen]
     free = shadow.free(way[0], samples.faces[chosen], *way[1:])
-    falls[chosen] = free & free_of((*projector.blocks, *shadow.hindrances), *way)
+    falls[chosen] = free & free_of(
+        (*projector.blocks, *shadow.about(projector.station)), *way
+    )
     return falls
 
 

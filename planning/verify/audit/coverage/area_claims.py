@@ -1,6 +1,6 @@
 """Claims about areas: coverage, causes, and what each device contributes."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -12,7 +12,11 @@ from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.estimates import ROUNDING
 from planning.verify.audit.predicates.audit_devices import AuditProjector, light_starts
-from planning.verify.audit.predicates.occlusion import block_of
+from planning.verify.audit.predicates.occlusion import (
+    Block,
+    Hindrance,
+    block_of,
+)
 from planning.verify.audit.predicates.predicates import (
     CAMERA_BODY,
     LIGHT_CAUSES,
@@ -136,6 +140,7 @@ def _audit_blocked(case: AuditCase, findings: AuditFindings) -> None:
     claims, actual = case.plan.coverage, case.actual
     devices = (*case.plan.projectors, *case.plan.cameras)
     blocks = {d.id: block for d in devices if (block := block_of(d)) is not None}
+    stations = {device.id: device.station for device in devices}
     hindrances = {solid.name: solid for solid in case.shadow.hindrances}
     dark = actual.samples.in_target & ~actual.measured
     seen_lit = actual.steps_of_cameras
@@ -159,7 +164,7 @@ def _audit_blocked(case: AuditCase, findings: AuditFindings) -> None:
         for name, solid in solids.items():
             behind = np.zeros(len(dark), dtype=bool)
             for line in lines:
-                if line.device != name or solids is hindrances:
+                if line.concerns(solid, stations):
                     behind[line.samples] |= solid.meets(line.starts, line.ends)
             case.estimator.audit(f"{key}.{name}", areas[name], behind, findings)
 
@@ -169,6 +174,7 @@ class _Ways:
     """Straight lines from a device, "" for one of a reference set, to samples (n,)."""
 
     device: str
+    station: str
     samples: Ints
     starts: Array
     ends: Array
@@ -176,7 +182,13 @@ class _Ways:
     @classmethod
     def of(cls, case: AuditCase, name: str, device: _Device, samples: Ints) -> "_Ways":
         ends = case.actual.samples.points[samples]
-        return cls(name, samples, light_starts(device, ends), ends)
+        return cls(name, device.station, samples, light_starts(device, ends), ends)
+
+    def concerns(self, solid: Block | Hindrance, stations: Mapping[str, str]) -> bool:
+        """Whether a body or an obstacle stands where the device does, and isn't its."""
+        if isinstance(solid, Hindrance):
+            return solid.station in ("", self.station)
+        return solid.name != self.device and stations[solid.name] in ("", self.station)
 
 
 def _stopped_of_reference(case: AuditCase, dark: Mask) -> Iterator[_Ways]:

@@ -17,6 +17,8 @@ from planning.verify.audit.predicates.occlusion import (
     touches,
 )
 
+from .workspace_claims import room_from_world
+
 _ROUNDING = 1e-9
 
 
@@ -63,8 +65,9 @@ def _audit_body(
 def audit_clearance(case: AuditCase, findings: AuditFindings) -> None:
     """Check that bodies keep off each other, the object, the floor and the zones.
 
-    Floor, zones and the clearance between two don't bind existing devices. What an
-    evaluated rig doesn't keep it says: `audit_evaluation` checks that.
+    Before a turntable that is so at every step, and of what stands there then. Floor,
+    zones and the clearance between two don't bind existing devices. What an evaluated
+    rig doesn't keep it says: `audit_evaluation` checks that.
     """
     space, stated = case.plan.requirements.workspace, case.plan.document.rig.clearance_m
     findings.number(
@@ -76,6 +79,10 @@ def audit_clearance(case: AuditCase, findings: AuditFindings) -> None:
     blocks = [(device, block_of(device)) for device in devices]
     solid = [(device, block.shrunk()) for device, block in blocks if block is not None]
     for (first, one), (second, other) in combinations(solid, 2):
+        if "" not in (first.station, second.station) and (
+            first.station != second.station
+        ):
+            continue
         key = f"{one.name}.body"
         findings.holds(
             not one.overlaps(other), key, f"overlaps the body of {other.name}"
@@ -89,9 +96,10 @@ def audit_clearance(case: AuditCase, findings: AuditFindings) -> None:
                 f"stands {1e3 * apart:.4g} mm from the body of {other.name}, nearer "
                 f"than {1e3 * space.clearance_m:g} mm",
             )
-    obstacles = {f"obstacle {h.name!r}": h.caster for h in case.shadow.hindrances}
     for device, block in solid:
         below = findings.at(f"{device.id}.body")
+        there = case.shadow.about(device.station)
+        obstacles = {f"obstacle {h.name!r}": h.caster for h in there}
         for name, caster in {"object": case.shadow.caster, **obstacles}.items():
             below.holds(
                 not touches(block, caster),
@@ -99,7 +107,8 @@ def audit_clearance(case: AuditCase, findings: AuditFindings) -> None:
                 f"touches the {name}; it must stand off it",
             )
         if not device.existing:
-            audit_body_zones(block, space, below)
+            back = room_from_world(case.plan, device.station)
+            audit_body_zones(block.moved(back), space, below)
 
 
 def audit_body_zones(block: Block, space: Workspace, findings: AuditFindings) -> None:

@@ -1,6 +1,6 @@
 """Claims about obstacles: whether they stand where the rig file puts them."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from planning.model.plan import RigPlan
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 
+from .workspace_claims import room_from_world
 from .zone_claims import origin_of, turned
 
 _ROUNDING = 1e-9
@@ -21,28 +22,64 @@ _FACETED = 0.005
 def audit_obstacles(case: AuditCase, findings: AuditFindings) -> None:
     """Check names and shapes against rig.obstacle and the keep-out zones that block.
 
-    The file of a mesh isn't at hand; that it was read rightly is taken on trust.
+    The file of a mesh isn't at hand; that it was read rightly is taken on trust. What
+    stands still about a turntable does so at every step.
     """
-    rig, obstacles = case.plan.document.rig, case.plan.surface.obstacles
-    zones = rig.workspace.get("keep_out") or []
-    solid = [{**zone, "shape": "box"} for zone in zones if zone.get("blocks", True)]
-    stated = [*rig.obstacle, *solid]
-    names = [table["name"] for table in stated]
+    obstacles, stated = case.plan.surface.obstacles, list(_stated(case.plan))
+    names = [name for name, _, _ in stated]
+    there = [(name, station) for name, station, _ in stated]
     if not findings.holds(
-        [obstacle.name for obstacle in obstacles] == names,
+        [(obstacle.name, obstacle.station) for obstacle in obstacles] == there,
         "obstacles",
         f"surface.npz holds {[o.name for o in obstacles]}, the rig states {names}",
     ):
         return
-    for obstacle, table in zip(obstacles, stated, strict=True):
+    first: dict[str, Array] = {}
+    for obstacle, (_, station, table) in zip(obstacles, stated, strict=True):
+        back = room_from_world(case.plan, station)
+        corners = obstacle.mesh.corners.reshape(-1, 3)
+        corners = corners @ back[:3, :3].T + back[:3, 3]
         if table["shape"] != "mesh":
-            _audit_shape(case.plan, obstacle, table, findings)
+            _audit_shape(case.plan, obstacle, corners, table, findings)
+            continue
+        same = first.setdefault(table["name"], corners)
+        findings.holds(
+            corners.shape == same.shape and np.abs(corners - same).max() <= _ROUNDING,
+            f"obstacle {obstacle.name!r}",
+            "doesn't stand in the room where it does at the first step",
+        )
+
+
+def _stated(plan: RigPlan) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
+    """Yield name, station and table of each obstacle; of one that stands still by step.
+
+    Those that turn with a part come first.
+    """
+    rig, steps = plan.document.rig, []
+    zones = rig.workspace.get("keep_out") or []
+    solid = [{**zone, "shape": "box"} for zone in zones if zone.get("blocks", True)]
+    still = set[str]()
+    if rig.turntable is not None and plan.document.stations is not None:
+        still = {*rig.turntable.still, *(zone["name"] for zone in solid)}
+        steps = [one.id for one in plan.document.stations.stations]
+    every = [*rig.obstacle, *solid]
+    yield from ((t["name"], "", t) for t in every if t["name"] not in still)
+    for table in every:
+        if table["name"] in still:
+            yield from ((f"{table['name']} ({s})", s, table) for s in steps)
 
 
 def _audit_shape(
-    plan: RigPlan, obstacle: Obstacle, table: Mapping[str, Any], findings: AuditFindings
+    plan: RigPlan,
+    obstacle: Obstacle,
+    corners: Array,
+    table: Mapping[str, Any],
+    findings: AuditFindings,
 ) -> None:
-    """Compare extent in the shape's own frame, and area, with what is stated."""
+    """Compare extent in the shape's own frame, and area, with what is stated.
+
+    Corners (n, 3) are those of its faces, in the room.
+    """
     space = plan.requirements.workspace
     centre, up = np.array(space.centre), np.array(space.up)
     origin = origin_of(plan)
@@ -58,7 +95,7 @@ def _audit_shape(
         axes = axes if up[third] > 0.0 else axes @ np.diag([1.0, -1.0, -1.0])
         turn = turn @ axes
         middle = middle - 0.5 * sides[2] * turn[:, 2]
-    local = (obstacle.mesh.corners.reshape(-1, 3) - origin - middle) @ turn
+    local = (corners - origin - middle) @ turn
     ends = np.stack([local.min(axis=0), local.max(axis=0)])
     off = float(np.abs(ends - 0.5 * sides * [[-1.0], [1.0]]).max())
     key = f"obstacle {obstacle.name!r}"

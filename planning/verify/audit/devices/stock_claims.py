@@ -15,14 +15,17 @@ def audit_stock(case: AuditCase, findings: AuditFindings) -> None:
     """Check that no more devices of a model are taken than there are."""
     stated: dict[tuple[str, str], int] = {}
     for kind in case.kinds:
-        taken = Counter(record.model for record in kind.records)
+        # Before a turntable the same devices measure at every step.
+        first = kind.devices[0].station if kind.devices else ""
+        at_once = [device for device in kind.devices if device.station == first]
+        taken = Counter(device.model for device in at_once)
         several = len(kind.models) > 1
         for model in kind.models:
             if model.count is None:
                 continue
             if several:
                 stated[kind.name, model.name] = model.count
-            n = taken[model.name] if several else len(kind.records)
+            n = taken[model.name] if several else len(at_once)
             findings.holds(
                 n <= model.count,
                 f"{kind.name}s",

@@ -75,16 +75,44 @@ def turns(plan: RigPlan) -> bool:
 
 
 def in_room(plan: RigPlan, station: str, positions: Array) -> Array:
-    """Return where devices at a station stand in the room, (n, 3) [m].
+    """Return where what the part sees at a station is in the room, (n, 3) [m].
 
-    Before a turntable they are seen by the part as turned back.
+    Before a turntable it is seen as turned back.
     """
-    stations = plan.document.stations
-    if stations is None or not turns(plan):
-        return positions
-    poses = {one.id: np.array(one.world_from_station) for one in stations.stations}
-    back = np.linalg.inv(poses.get(station, np.eye(4)))
+    back = room_from_world(plan, station)
     return positions @ back[:3, :3].T + back[:3, 3]
+
+
+def room_from_world(plan: RigPlan, station: str) -> Array:
+    """Return the pose that takes what the part sees at a station to the room, (4, 4).
+
+    The identity where the part doesn't turn.
+    """
+    told = plan.document.stations
+    if told is None or told.axis is None or told.point_m is None or not turns(plan):
+        return np.eye(4)
+    angles = {one.id: one.angle or 0.0 for one in told.stations}
+    axis, point = np.array(told.axis), np.array(told.point_m)
+    return turned_back(axis, point, -angles.get(station, 0.0))
+
+
+def turned_back(axis: Array, point: Array, angle: float) -> Array:
+    """What takes the room to the part's frame when the table has turned by an angle.
+
+    By quaternion: q = (cos(a / 2), -sin(a / 2) axis).
+    """
+    w, (x, y, z) = np.cos(0.5 * angle), -np.sin(0.5 * angle) * axis
+    turn = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    pose = np.eye(4)
+    pose[:3, :3] = turn
+    pose[:3, 3] = point - turn @ point
+    return pose
 
 
 def outside_by(positions: Array, shell: tuple[float, float], space: Workspace) -> Array:

@@ -88,6 +88,11 @@ class Block:
         found = lsq_linear(system, other.middle - self.middle, (-reach, reach))
         return float(np.sqrt(2.0 * found.cost))
 
+    def moved(self, pose: Array) -> "Block":
+        """Return the box where a pose (4, 4) takes it."""
+        middle = pose[:3, :3] @ self.middle + pose[:3, 3]
+        return replace(self, turn=pose[:3, :3] @ self.turn, middle=middle)
+
     def shrunk(self) -> "Block":
         """Return the box less what rounding a position may have added."""
         return replace(self, half=np.maximum(self.half - _SLACK_M, 0.0))
@@ -109,26 +114,34 @@ def block_of_zone(zone: Box, centre: Array) -> Block:
 
 
 def bodies_but(plan: RigPlan, device: _Device) -> tuple[Block, ...]:
-    """Return the bodies of all devices of a plan but one."""
+    """Return the bodies of all devices of a plan but one, that stand where it does."""
     every = (*plan.projectors, *plan.cameras)
-    return _bodies(other for other in every if other.id != device.id)
+    return _bodies(
+        other
+        for other in every
+        if other.id != device.id and other.station in ("", device.station)
+    )
 
 
 def bodies_about(plan: RigPlan, kind: str, pose: Array) -> tuple[Block, ...]:
     """Return the bodies among which a reference pose covers what it does.
 
-    Those of existing devices, and for a camera those of the projectors. A device that
-    stands at the pose is itself.
+    Those of existing devices, and for a camera those of the projectors, at no station.
+    A device that stands at the pose is itself.
     """
     projectors = [p for p in plan.projectors if kind == "camera" or p.existing]
     standing = [*projectors, *(camera for camera in plan.cameras if camera.existing)]
     return _bodies(
-        d for d in standing if np.abs(d.world_from_device - pose).max() > _POSE
+        d
+        for d in standing
+        if not d.station and np.abs(d.world_from_device - pose).max() > _POSE
     )
 
 
 class Hindrance:
     """An obstacle: what no light and no view passes.
+
+    With a `station` it is in the way of that station's devices alone.
 
     Args:
         obstacle: The plan's.
@@ -136,7 +149,7 @@ class Hindrance:
     """
 
     def __init__(self, obstacle: Obstacle, *, threads: int) -> None:
-        self.name = obstacle.name
+        self.name, self.station = obstacle.name, obstacle.station
         self.caster = RayCaster(obstacle.mesh, threads=threads)
 
     def meets(self, starts: Array, ends: Array) -> Mask:
@@ -195,7 +208,7 @@ class Shadow:
     Args:
         mesh: The occluder.
         threads: Worker threads of the ray caster.
-        obstacles: In the way of every device.
+        obstacles: In the way of every device, or of those of a station.
     """
 
     def __init__(
@@ -212,6 +225,10 @@ class Shadow:
         """Return what stands in the way about a plan's object, but devices."""
         surface = plan.surface
         return cls(surface.mesh, threads=threads, obstacles=surface.obstacles)
+
+    def about(self, station: str) -> list[Hindrance]:
+        """Return the obstacles in the way of devices of a station; "": of none."""
+        return [one for one in self.hindrances if one.station in ("", station)]
 
     def free(self, points: Array, faces: Ints, along: Array, lengths: Array) -> Mask:
         """Return whether segments (n,) along unit directions are free.

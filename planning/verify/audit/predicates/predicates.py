@@ -188,7 +188,7 @@ def _pass_free(
     along, length = (of[chosen] for of in way)
     free = shadow.free(points, samples.faces[chosen], along, length)
     steps[chosen] += free
-    for solids in (device.blocks, shadow.hindrances):
+    for solids in (device.blocks, shadow.about(device.station)):
         free &= free_of(solids, points, along, length)
         steps[chosen] += free
 

@@ -21,15 +21,19 @@ _QUADS = np.array(
 def obstacles_of(scanner: Scanner, name: str) -> RayCaster | None:
     """Return the bodies of all devices but one, and obstacles; None of nothing.
 
-    They are in the way of the light or view of the device of that name.
+    They are in the way of the light or view of the device of that name, and stand at
+    its station where they stand at one.
     """
     every = (*scanner.projectors, *scanner.cameras)
+    (here,) = (device.station for device in every if device.id == name)
     corners = [
-        _corners(device) for device in every if device.id != name and device.body
+        _corners(device)
+        for device in every
+        if device.id != name and device.body and device.station in ("", here)
     ]
     box = np.concatenate([_QUADS[:, [0, 1, 2]], _QUADS[:, [0, 2, 3]]])
     parts = [TriangleMesh(of_body, box) for of_body in corners]
-    parts += [solid.mesh for solid in scanner.obstacles]
+    parts += [o.mesh for o in scanner.obstacles if o.station in ("", here)]
     return RayCaster(TriangleMesh.joined(parts), threads=1) if parts else None
 
 

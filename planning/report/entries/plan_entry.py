@@ -26,11 +26,11 @@ from planning.model.document.plan_document import (
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
 from planning.model.surface import Surface
-from planning.report.entries.cost_entry import cost_record
+from planning.report.claims import Claims
+from planning.report.partial_plan import Prepared
 
-from .claims import Claims
-from .entries import device_entries as entries
-from .partial_plan import Prepared
+from . import device_entries as entries
+from .cost_entry import cost_record
 
 
 @dataclass(frozen=True, eq=False)

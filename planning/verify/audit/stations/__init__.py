@@ -1,0 +1,1 @@
+"""Claims about heads, stations and steps of a turntable."""
