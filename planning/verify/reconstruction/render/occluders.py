@@ -25,7 +25,7 @@ def obstacles_of(scanner: Scanner, name: str) -> RayCaster | None:
     its station where they stand at one.
     """
     every = (*scanner.projectors, *scanner.cameras)
-    (here,) = (device.station for device in every if device.id == name)
+    here = next((device.station for device in every if device.id == name), "")
     corners = [
         _corners(device)
         for device in every
