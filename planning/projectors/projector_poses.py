@@ -5,28 +5,25 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation, Slerp
 
-from geometry.poses import inverse
 from planning.model.device_poses import moved_to
 from planning.model.planned import PlannedProjector
 from planning.proofs.losses import light_kept, still_lit
 from planning.proofs.quotas import Quotas
 from planning.scene.bodies.clearance import lacks_clearance
-from planning.scene.codes.patterns import pattern_of
 from planning.scene.draws import DRAWS
 from planning.scene.lighting import lit_margins, lit_stages
 from planning.scene.limits import projector_limits
 from planning.scene.placed_bodies import moves_bodies
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
-from planning.scene.workspace.admissible import half_spaces
 from planning.scene.workspace.mount_settings import settable
-from solvers.poses.pose_problem import PoseProgram, pose_margins
+from solvers.poses.pose_problem import pose_margins
 from solvers.poses.pose_program import pose_slack, solve_pose
 
 from .fewest_projectors import confirms
 from .loss_confirmation import confirms_losses
+from .pose_programs import part_of_the_way, pose_program
 from .projector_stage import ProjectorStage
 from .share_margin import lit_by_any, margin_at_share, to_keep, widest_between
 
@@ -34,9 +31,6 @@ _SWEEPS = 6
 # Gains below this aren't worth a move [rad].
 _GAIN = 1e-4
 _STEPS = (1.0, 0.5, 0.25)
-# A pixel of the image border stays free, so that rounding the pose loses nothing.
-_PIXEL_MARGIN = 1.0
-_MAX_MOVE_M = 0.3
 # Samples on which poses between the candidates are compared; all of them decide.
 _SEARCHED = 2000
 # Of the samples that candidates reach: so many others a pose may light.
@@ -195,7 +189,7 @@ def _improve(state: _Lit, p: int, required: int, kept: Quotas) -> bool:
         return False
     before = float(pose_margins(program, projector.world_from_device).min())
     for step in _STEPS:
-        pose = _part_of_the_way(
+        pose = part_of_the_way(
             projector.world_from_device, solution.world_from_device, step
         )
         settings = settable(state.scene.requirements.workspace, projector, pose[None])
@@ -215,51 +209,3 @@ def _improve(state: _Lit, p: int, required: int, kept: Quotas) -> bool:
             state.projectors[p], state.margin = offered, margin
             return True
     return False
-
-
-def pose_program(
-    scene: Scene, projector: PlannedProjector, assigned: Target
-) -> PoseProgram:
-    """State the pose program of one projector over the samples assigned to it."""
-    required, device = scene.requirements, projector.device
-    workspace = scene.safe_workspace
-    up, centre = np.array(workspace.up), np.array(workspace.centre)
-    offset = projector.world_from_device[:3, 3] - centre
-    normals, offsets = half_spaces(workspace, offset)
-    return PoseProgram(
-        points=assigned.samples.points,
-        normals=assigned.samples.normals,
-        steep=assigned.steep,
-        light=projector.light,
-        world_from_device=projector.world_from_device,
-        max_incidence=required.projector.max_incidence,
-        min_tangent_angle=required.projector.min_tangent_angle,
-        range_m=device.range_m,
-        shell_m=workspace.projector_radius_m,
-        centre=centre,
-        axis=np.array(workspace.axis),
-        half_angle=workspace.half_angle,
-        sides=device.sides(_PIXEL_MARGIN),
-        beam_radius_m=device.beam_reach,
-        ring_radius=pattern_of(projector).outermost,
-        ring_from_device=inverse(projector.world_from_ring)
-        @ projector.world_from_device,
-        up=up,
-        floor=-np.inf
-        if workspace.floor_m is None
-        else workspace.floor_m + float(up @ centre),
-        max_move_m=_MAX_MOVE_M,
-        half_spaces=np.column_stack([normals, offsets + normals @ centre]),
-    )
-
-
-def _part_of_the_way(
-    start: NDArray[np.float64], end: NDArray[np.float64], share: float
-) -> NDArray[np.float64]:
-    if share == 1.0:
-        return end
-    turns = Rotation.from_matrix(np.stack([start[:3, :3], end[:3, :3]]))
-    pose = np.eye(4)
-    pose[:3, :3] = Slerp([0.0, 1.0], turns)(share).as_matrix()
-    pose[:3, 3] = (1.0 - share) * start[:3, 3] + share * end[:3, 3]
-    return pose

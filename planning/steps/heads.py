@@ -9,6 +9,7 @@ from planning.cameras.stations.heads.fewest_heads import FoundHeads, fewest_head
 from planning.cameras.stations.heads.head_poses import HeadSource, PlacedHead, widened
 from planning.cameras.stations.heads.head_stage import least_by_light, stages_of
 from planning.cameras.stations.heads.tour import shortest_way
+from planning.cameras.stations.heads.wider_heads import wider_heads
 from planning.model.document.station_records import (
     Placement,
     StationCount,
@@ -16,7 +17,6 @@ from planning.model.document.station_records import (
     StationsRecord,
 )
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.heads import Head
 from planning.model.progress import Stopwatch
 from planning.model.words import count_words
 from planning.proofs import projector_bound
@@ -44,7 +44,7 @@ def heads_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
         carried=request.rig.stations is not None,
     )
     found = _fewest(ready, source, most, clock)
-    partial = _placed(ready, head, found, None, clock)
+    partial = _placed(ready, source, found, None, clock)
     yield partial, False
     with clock.stage("bounds", "bounds over all poses of the workspace"):
         effort = projector_bound.PROVE if request.prove else projector_bound.DEFAULT
@@ -60,7 +60,7 @@ def heads_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
             return
         found, count = more, len(more.chosen)
         clock.say(f"  fresh samples fall short: {count_words(count, 'head')}")
-        partial = _placed(ready, head, found, everywhere, clock)
+        partial = _placed(ready, source, found, everywhere, clock)
 
 
 def _fewest(
@@ -82,31 +82,32 @@ def _fewest(
 
 def _placed(
     ready: Prepared,
-    head: Head,
+    source: HeadSource,
     found: FoundHeads,
     everywhere: int | None,
     clock: Stopwatch,
 ) -> PartialPlan:
     """Devices of the heads chosen, in the order in which they measure."""
-    carried = ready.request.rig.stations is not None
-    heads, way = _in_order(found.taken, carried=carried)
-    letter = "S" if carried else "H"
+    with clock.stage("heads", "heads: moved to the widest margins"):
+        taken = wider_heads(source, found.cover, found.taken)
+    heads, way = _in_order(taken, carried=source.carried)
+    letter = "S" if source.carried else "H"
     names = [f"{letter}{k + 1}" for k in range(len(heads))]
     placements = tuple(
         Placement(name, one.world_from_head, len(one.projectors), len(one.cameras))
         for name, one in zip(names, heads, strict=True)
     )
     planned = [
-        one.named("" if head.cross else name)
+        one.named("" if source.head.cross else name)
         for name, one in zip(names, heads, strict=True)
     ]
     reference = [one.named(f"reference {k}") for k, one in enumerate(found.heads)]
     with clock.stage("heads", "heads: what their devices light and measure"):
         lights, views = stages_of(ready.scene, planned, reference)
     record = StationsRecord(
-        kind="stations" if carried else "heads",
-        head=head.name,
-        cross=head.cross,
+        kind="stations" if source.carried else "heads",
+        head=source.head.name,
+        cross=source.head.cross,
         stations=(),
         n_reference=len(planned) + len(reference),
         count=_count(found, everywhere),

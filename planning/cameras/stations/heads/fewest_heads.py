@@ -235,17 +235,10 @@ def _moved_together(
             best = int(np.argmin(short))
             if short[best] < lacking:
                 lacking, heads[k] = int(short[best]), around[best]
-                sets = _with_at(sets, k, offered.take(np.array([best])))
+                sets = sets.with_at(k, offered.take(np.array([best])))
             if lacking == 0 and source.colliding(heads) is None:
                 return tuple(heads)
     return None
-
-
-def _with_at(sets: HeadSets, k: int, one: HeadSets) -> HeadSets:
-    """Return sets with another head in the place of one."""
-    lit, measured = sets.lit.copy(), sets.measured.copy()
-    lit[:, k], measured[:, k] = one.lit[:, 0], one.measured[:, 0]
-    return replace(sets, lit=lit, measured=measured)
 
 
 def _lacking_with_each(cover: HeadCover, others: HeadSets, offered: HeadSets) -> Ints:

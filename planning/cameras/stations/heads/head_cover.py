@@ -63,6 +63,12 @@ class HeadSets:
             np.concatenate([self.measured, other.measured], axis=1),
         )
 
+    def with_at(self, k: int, one: "HeadSets") -> "HeadSets":
+        """Return these heads, another in the place of one."""
+        lit, measured = self.lit.copy(), self.measured.copy()
+        lit[:, k], measured[:, k] = one.lit[:, 0], one.measured[:, 0]
+        return replace(self, lit=lit, measured=measured)
+
     def with_samples(self, other: "HeadSets") -> "HeadSets":
         """Return the same heads on the samples of both."""
         return HeadSets(

@@ -90,7 +90,7 @@ class HeadSource:
         self, head: PlacedHead, n: int, scale: float = 1.0
     ) -> tuple[PlacedHead, ...]:
         """Return poses close around one of a lattice of n, turned as it is."""
-        view = replace(self._view, world_from_device=head.world_from_head)
+        view = replace(self.view, world_from_device=head.world_from_head)
         views = self._offer.around([view], n // _ROLLS, scale, far=True)
         return self._turned(views, head.quarters)
 
@@ -136,7 +136,7 @@ class HeadSource:
         return centre, float(np.linalg.norm(ways, axis=1).max())
 
     @cached_property
-    def _view(self) -> PlannedCamera:
+    def view(self) -> PlannedCamera:
         """A camera that sees the head's measuring volume, in its frame."""
         volume = self.head.volume
         width, height = volume.size_at(np.array(self.head.working_m)).tolist()
@@ -149,7 +149,7 @@ class HeadSource:
 
     @cached_property
     def _offer(self) -> Candidates[PlannedCamera]:
-        (offer,) = self.scene.candidates([self._view], self.workspace).of_models
+        (offer,) = self.scene.candidates([self.view], self.workspace).of_models
         return offer
 
     def _turned(
@@ -162,10 +162,10 @@ class HeadSource:
         )
         every = (self.at(view.world_from_device @ turn) for view in views)
         return tuple(
-            replace(head, quarters=quarters) for head in every if self._may_stand(head)
+            replace(head, quarters=quarters) for head in every if self.may_stand(head)
         )
 
-    def _may_stand(self, head: PlacedHead) -> bool:
+    def may_stand(self, head: PlacedHead) -> bool:
         """Whether workspace and object let its devices and its housing stand there."""
         space = self.scene.requirements.workspace
         kinds = (
