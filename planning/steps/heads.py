@@ -89,7 +89,7 @@ def _placed(
 ) -> PartialPlan:
     """Devices of the heads chosen, in the order in which they measure."""
     with clock.stage("heads", "heads: moved to the widest margins"):
-        taken = wider_heads(source, found.cover, found.taken)
+        taken = wider_heads(source, found.cover, found.fresh, found.taken)
     heads, way = _in_order(taken, carried=source.carried)
     letter = "S" if source.carried else "H"
     names = [f"{letter}{k + 1}" for k in range(len(heads))]

@@ -58,7 +58,7 @@ def test_a_head_comes_to_stand_over_the_middle_of_a_plate():
     start = _at(source, (0.15, -0.1, 0.57))
     cover = HeadCover.of(source.scene, HeadSets.of(source.scene, [start], target))
     assert cover.sets.measured.all()
-    (head,) = wider_heads(source, cover, [start])
+    (head,) = wider_heads(source, cover, cover, [start])
     points = target.samples.points
     highest = source.workspace.camera_radius_m[1]
     reach = np.linalg.norm(points[:, :2], axis=1).max()
@@ -82,7 +82,7 @@ def test_heads_about_an_egg_measure_no_less_and_what_counts_more_squarely():
     starts = [_at(source, place) for place in places]
     every = HeadSets.of(source.scene, starts, target)
     cover = HeadCover.of(source.scene, every)
-    heads = wider_heads(source, cover, starts)
+    heads = wider_heads(source, cover, cover, starts)
     assert any(a is not b for a, b in zip(heads, starts, strict=True))
     moved = replace(cover, sets=HeadSets.of(source.scene, heads, target))
     chosen = np.arange(len(starts))
@@ -92,6 +92,24 @@ def test_heads_about_an_egg_measure_no_less_and_what_counts_more_squarely():
         for some, placed in ((every, starts), (moved.sets, heads))
     ]
     assert squarely[1] > squarely[0]
+
+
+def test_what_fresh_samples_deny_is_not_done():
+    """All that is asked of them only the beginning measures."""
+    source = _source(_plate(), requirements={"coverage": 1.0, "region_coverage": 0.0})
+    target = source.scene.target_samples(replace(DRAWS.cameras, count=2000))
+    start = _at(source, (0.15, -0.1, 0.57))
+    few = target.take(np.arange(200))
+    cover = HeadCover.of(source.scene, HeadSets.of(source.scene, [start], few))
+    (moved,) = wider_heads(source, cover, cover, [start])
+    assert moved is not start
+    wide = replace(target.samples, points=5.0 * target.samples.points)
+    both = HeadSets.of(source.scene, [start, moved], replace(target, samples=wide))
+    lost = np.flatnonzero(both.measured[:, 0] & ~both.measured[:, 1])
+    assert len(lost) > 20
+    seen = HeadSets.of(source.scene, [start], both.target.take(lost))
+    fresh = HeadCover.of(source.scene, seen)
+    assert wider_heads(source, cover, fresh, [start]) == (start,)
 
 
 def _facing(sets, heads, target):
@@ -111,4 +129,4 @@ def test_housings_in_each_others_way_keep_heads_where_they_are():
     starts = [_at(source, (0.6, 0.0, 0.0)), _at(source, (0.6, 0.02, 0.0))]
     assert source.colliding(starts) is not None
     cover = HeadCover.of(source.scene, HeadSets.of(source.scene, starts, target))
-    assert wider_heads(source, cover, starts) == tuple(starts)
+    assert wider_heads(source, cover, cover, starts) == tuple(starts)

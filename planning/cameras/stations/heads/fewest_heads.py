@@ -38,6 +38,7 @@ class FoundHeads:
         lower_bound: Proven least number of the candidates.
         proof: What proves it.
         greedy: As many a greedy choice takes; None: it never gets there.
+        fresh: What is asked of other samples, on which those chosen were tried.
     """
 
     heads: tuple[PlacedHead, ...]
@@ -47,6 +48,7 @@ class FoundHeads:
     lower_bound: int
     proof: str
     greedy: int | None
+    fresh: HeadCover
 
     def with_one_more(self, source: HeadSource) -> "FoundHeads | None":
         """Return one head more: the best of so many, or that which adds most.
@@ -86,19 +88,25 @@ def fewest_heads(
     sets = HeadSets.of(scene, heads, scene.target_samples(DRAWS.cameras))
     heads, sets, known = _with_better(source, heads, sets, n, least)
     fewest = _fewest_of(source, heads, sets, most, known)
+    fresh = _fresh(source, heads, 0)
     for draw in range(_ROUNDS):
-        fresh = scene.target_samples(DRAWS.fresh_cameras.later(1 + draw))
-        again = HeadSets.of(scene, heads, fresh)
         met = fewest.needed is not None and fewest.needed <= most
-        if not met or not HeadCover.of(scene, again).lacking(fewest.chosen):
+        if not met or not fresh.lacking(fewest.chosen):
             break
-        sets = sets.with_samples(again)
+        sets = sets.with_samples(fresh.sets)
         fewest = _fewest_of(source, heads, sets, most, known)
+        fresh = _fresh(source, heads, 1 + draw)
     cover, chosen, needed, solution = fewest
     bound, proof = cover.proved(solution, seed=scene.seed, budget=_PROOF_BUDGET)
     whole, met = _greedy(cover)
     greedy = len(whole) if met else None
-    return FoundHeads(heads, cover, chosen, needed, bound, proof, greedy)
+    return FoundHeads(heads, cover, chosen, needed, bound, proof, greedy, fresh)
+
+
+def _fresh(source: HeadSource, heads: tuple[PlacedHead, ...], draw: int) -> HeadCover:
+    """What is asked of samples that no cover saw yet."""
+    target = source.scene.target_samples(DRAWS.fresh_cameras.later(1 + draw))
+    return HeadCover.of(source.scene, HeadSets.of(source.scene, heads, target))
 
 
 class _Fewest(NamedTuple):

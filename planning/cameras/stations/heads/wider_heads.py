@@ -6,7 +6,8 @@ squarely than the others do. Of those as many count as are required, as of proje
 (`share_margin`); the rest is to spare. Between its devices and the surface rays decide:
 a move is taken the whole way, half or a quarter of it, if then what is asked is lit and
 measured with some to spare, or no less than before, what counts as squarely at least,
-and no housing is in another's way.
+and no housing is in another's way. Fresh samples confirm the end; where they don't,
+nothing is moved.
 """
 
 from collections.abc import Sequence
@@ -32,20 +33,30 @@ _SPARE = 0.01
 
 
 def wider_heads(
-    source: HeadSource, cover: HeadCover, heads: Sequence[PlacedHead]
+    source: HeadSource,
+    cover: HeadCover,
+    fresh: HeadCover,
+    heads: Sequence[PlacedHead],
 ) -> tuple[PlacedHead, ...]:
     """Return heads at poses of larger margin, as many, that serve no less.
 
     Args:
         source: Gives heads at poses.
         cover: What is asked, and of which samples.
+        fresh: The same of others.
         heads: Where they begin.
     """
     state = _Heads(source, cover, list(heads))
     for _ in range(_SWEEPS):
         if not any([state.improve(k) for k in range(len(heads))]):
             break
-    return tuple(state.heads)
+    short = [
+        replace(fresh, sets=HeadSets.of(source.scene, some, fresh.sets.target)).lacking(
+            np.arange(len(some))
+        )
+        for some in (heads, state.heads)
+    ]
+    return tuple(state.heads if short[1] <= short[0] else heads)
 
 
 class _Heads:
