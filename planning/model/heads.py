@@ -231,6 +231,14 @@ class Turntable:
         pose[:3, 3] = point - pose[:3, :3] @ point
         return pose
 
+    def move_s(self, n_steps: int) -> float | None:
+        """Return what turning through so many steps takes [s]: (n - 1) t of one.
+
+        None: it isn't said.
+        """
+        each = self.seconds_per_step
+        return None if each is None else (n_steps - 1) * each
+
     @property
     def angles(self) -> tuple[float, ...]:
         """Angles of the steps [rad], from 0 up; none where any angle may be set."""
@@ -253,3 +261,13 @@ class Stations:
     carrier: Literal["robot", "tripod"]
     seconds_per_metre: float | None = None
     seconds_per_station: float | None = None
+
+    def move_s(self, way_m: float, n_stations: int) -> float | None:
+        """Return what being carried takes [s]: t of a metre times way, and t_rest n.
+
+        What isn't said of the two is left out; None: nothing is.
+        """
+        each, rest = self.seconds_per_metre, self.seconds_per_station
+        if each is None and rest is None:
+            return None
+        return way_m * (each or 0.0) + n_stations * (rest or 0.0)

@@ -112,8 +112,9 @@ def _placed(
         n_reference=len(planned) + len(reference),
         count=_count(found, everywhere),
     )
-    if way is not None:
-        record = record.changed(way_m=way)
+    stations = ready.request.rig.stations
+    if way is not None and stations is not None:
+        record = record.changed(way_m=way, move_s=stations.move_s(way, len(heads)))
     return PartialPlan(
         ready,
         lights,

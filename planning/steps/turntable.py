@@ -223,6 +223,7 @@ def _placed(
         count=_count(search, steps, needed),
         point_m=lattice.table.point_m,
         axis=lattice.table.axis,
+        move_s=lattice.table.move_s(len(placements)),
         steps=traded.rows,
     )
     return PartialPlan(

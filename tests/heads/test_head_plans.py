@@ -139,11 +139,14 @@ def test_a_pair_across_heads_measures_nothing(plan, handmade):
 
 
 def test_stations_of_one_head_are_in_the_order_of_the_shortest_way(few, handmade):
-    rig = head_rig(stations={"carrier": "robot"})
+    timed = {"seconds_per_metre": 4.0, "seconds_per_station": 1.5}
+    rig = head_rig(stations={"carrier": "robot"} | timed)
     carried = planned(rig, max_heads=9)
     told = carried.document.stations
     places = np.array([np.array(s.world_from_station)[:3, 3] for s in told.stations])
     assert told.kind == "stations"
+    took = 4.0 * told.way_m + 1.5 * len(told.stations)
+    assert told.move_s == pytest.approx(took, abs=1e-9)
     assert told.way_m == pytest.approx(
         float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum()), abs=1e-4
     )

@@ -14,6 +14,7 @@ from planning.cameras.stations.turntable.table_lattice import TableLattice, abou
 from planning.cameras.stations.turntable.table_sets import TableSets
 from planning.model.device_poses import moved_to
 from planning.model.errors import InfeasibleLimitsError, InputError, PlanFileError
+from planning.report.summary.brief import brief
 from planning.scene.draws import DRAWS
 from planning.steps.prepare import prepared
 from planning.verify.audit.audit import audit_plan
@@ -45,7 +46,7 @@ def few(with_little_work):
 
 @pytest.fixture(scope="module")
 def plan(few):
-    rig = table_rig(table={"point_mm": [12.0, -7.0, 0.0]})
+    rig = table_rig(table={"point_mm": [12.0, -7.0, 0.0], "seconds_per_step": 1.5})
     return planned(rig, max_projectors=2, max_cameras=2, coverage=0.85)
 
 
@@ -187,6 +188,13 @@ def test_devices_stand_upright_whichever_way_the_part_turns(few):
     assert audit_plan(turned, n_samples=2000).failures == ()
 
 
+def test_turning_from_step_to_step_takes_its_time(plan):
+    told = plan.document.stations
+    assert told.move_s == 1.5 * (len(told.stations) - 1)
+    text = brief(plan, (), ())
+    assert f"{told.move_s:.1f} s to move between steps" in text
+
+
 def test_the_audit_finds_every_claim_true(plan):
     audit = audit_plan(plan, n_samples=5000)
     assert audit.failures == ()
@@ -218,6 +226,7 @@ def test_steps_for_other_devices_are_told_and_more_devices_take_no_more(plan):
         (lambda s: s["count"].update(lower_bound=99), "lower_bound"),
         (lambda s: s["stations"].reverse(), "projectors"),
         (lambda s: s.update(count=None), "count"),
+        (lambda s: s.update(move_s=0.5), "move_s"),
         (lambda s: s.update(steps=[]), "each once"),
         (lambda s: s["steps"].append(s["steps"][0]), "each once"),
         (lambda s: [row.update(steps=1) for row in s["steps"]], "needed"),

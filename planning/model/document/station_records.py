@@ -83,6 +83,8 @@ class StationsRecord(Part):
             its devices measure with any of the plan.
         point_m: On the axis of the turntable; `axis` is its direction.
         way_m: Way of a head from the first of its stations to the last [m].
+        move_s: What moves between the stations, or steps, take of what the rig states
+            of them [s]; None: it states nothing.
         steps: The fewest for other numbers of devices.
     """
 
@@ -95,6 +97,7 @@ class StationsRecord(Part):
     point_m: tuple[float, float, float] | None = None
     axis: tuple[float, float, float] | None = None
     way_m: float | None = None
+    move_s: float | None = None
     steps: tuple[TradeRow, ...] = ()
 
 

@@ -23,7 +23,7 @@ from .device_lines import axis_name, devices_words, models_line, standing, used_
 from .proof_lines import target_words
 from .region_lines import worst_region
 from .shortfall import Shortfall, missing
-from .station_lines import fewest_words, title_words
+from .station_lines import fewest_words, moves_words, title_words
 from .summary import lost_in_field
 from .warning_lines import warnings
 
@@ -298,7 +298,11 @@ def _end(plan: RigPlan, files: Sequence[str]) -> Iterator[_Block]:
         seconds = (
             "" if cost.frame_s is None else f", {cost.n_frames * cost.frame_s:.2f} s"
         )
-        yield "SCAN", f"{count_words(cost.n_frames, 'frame')}{seconds}", 1
+        yield (
+            "SCAN",
+            f"{count_words(cost.n_frames, 'frame')}{seconds}{moves_words(plan)}",
+            1,
+        )
     if not files:
         return
     folder = Path(files[0]).parent

@@ -124,3 +124,11 @@ def _steps(rows: tuple[TradeRow, ...]) -> Iterator[str]:
         steps = "none" if row.steps is None else str(row.steps)
         devices = f"{row.projectors:>10}  {row.cameras:>7}"
         yield f"{devices}  {steps:>12}  {row.lower_bound:>6}"
+
+
+def moves_words(plan: RigPlan) -> str:
+    """Say what moves from one station to the next take; empty where it isn't known."""
+    told = plan.document.stations
+    if told is None or told.move_s is None:
+        return ""
+    return f", and {told.move_s:.1f} s to move between {STATIONS[told.kind]}s"

@@ -16,6 +16,7 @@ from planning.verify.audit.predicates.occlusion import Block, touches
 # Poses are written to 0.01 mm, of devices and of what carries them.
 _POSITION_M = 3e-5
 _TURN = 1e-9
+_ROUNDING = 1e-6
 
 
 def audit_heads(
@@ -40,6 +41,7 @@ def audit_heads(
         way = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
         slack = 2.0 * len(places) * _POSITION_M
         findings.number("way_m", told.way_m or 0.0, way, slack, "m")
+        _audit_moves(plan, told, findings)
         shorter = _shorter_way(places)
         findings.holds(
             shorter >= way - slack,
@@ -48,6 +50,21 @@ def audit_heads(
         )
     else:
         findings.same("way_m", told.way_m, None, "heads that all stand")
+        findings.same("move_s", told.move_s, None, "heads that all stand")
+
+
+def _audit_moves(plan: RigPlan, told: StationsRecord, findings: AuditFindings) -> None:
+    """The way by its time, and coming to rest at each station, as the rig states."""
+    carrier, truth = plan.document.rig.stations, None
+    if carrier is not None:
+        terms = (
+            (carrier.seconds_per_metre, told.way_m or 0.0),
+            (carrier.seconds_per_station, len(told.stations)),
+        )
+        stated = [each * times for each, times in terms if each is not None]
+        truth = sum(stated) if stated else None
+    slack = _ROUNDING * (1.0 + (truth or 0.0))
+    findings.same("move_s", told.move_s, truth, "rig.stations", slack)
 
 
 def _shorter_way(places: Array) -> float:

@@ -32,6 +32,10 @@ def audit_steps(plan: RigPlan, told: StationsRecord, findings: AuditFindings) ->
             f"{claimed.tolist()} is claimed, the rig's turntable has {list(truth)}",
         )
     _audit_angles(table, told, findings)
+    each = table.seconds_per_step
+    truth = None if each is None else each * (len(told.stations) - 1)
+    slack = _ROUNDING * (1.0 + (truth or 0.0))
+    findings.same("move_s", told.move_s, truth, "rig.turntable", slack)
     poses = {d.id: d.world_from_device for d in (*plan.projectors, *plan.cameras)}
     first = told.stations[0]
     for one in told.stations:
