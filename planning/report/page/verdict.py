@@ -45,9 +45,9 @@ def headline(plan: RigPlan) -> str:
     if plan.cameras_alone:
         devices = f"{devices_words(plan)} alone, by the object's texture,"
     if document.stations is not None:
-        devices = f"{title_words(document.stations)}, each of them by {devices}"
+        devices = f"{title_words(document)}, each of them by {devices}"
         if document.stations.kind == "heads":
-            devices = f"{title_words(document.stations)}, of {devices_words(plan)},"
+            devices = f"{title_words(document)}, of {devices_words(plan)},"
     target = {"dominant": "dominant regions", "surface": "whole surface"}
     sigma = plan.coverage.sigma
     exact = (

@@ -77,7 +77,7 @@ def _head(plan: RigPlan, short: Sequence[Shortfall]) -> Iterator[_Block]:
     document, rig = plan.document, plan.document.rig
     devices = devices_words(plan)
     if document.stations is not None:
-        devices = f"{title_words(document.stations)} ({devices})"
+        devices = f"{title_words(document)} ({devices})"
     state = f", {_state(plan)}" if _state(plan) else ""
     name = Path(document.meshes[0].path or "the mesh").name
     if short:

@@ -6,6 +6,7 @@ import numpy as np
 
 from geometry.arrays import Array
 from geometry.poses import pan_tilt_roll
+from planning.model.document.plan_document import PlanDocument
 from planning.model.document.station_records import (
     StationRecord,
     StationsRecord,
@@ -65,7 +66,7 @@ def station_lines(plan: RigPlan) -> list[str]:
     if told is None:
         return []
     label, up = f"{STATIONS[told.kind].upper()}S", plan.requirements.workspace.up
-    lines = [title_words(told)]
+    lines = [title_words(plan.document)]
     if told.kind != "turntable":
         lines.append(_HEADING)
     lines += [_row(one, np.array(up)) for one in told.stations]
@@ -84,8 +85,11 @@ def _row(one: StationRecord, up: Array) -> str:
     return f"{place}  {pan:9.1f} {tilt:7.1f} {roll:7.1f}   {devices}"
 
 
-def title_words(told: StationsRecord) -> str:
-    """Return what stands at the stations, in a sentence."""
+def title_words(document: PlanDocument) -> str:
+    """Return what stands at the stations, in a sentence; empty where there are none."""
+    told, carried = document.stations, document.rig.stations
+    if told is None:
+        return ""
     n, word = len(told.stations), STATIONS[told.kind]
     if told.kind == "turntable":
         angles = [one.angle for one in told.stations if one.angle is not None]
@@ -98,7 +102,8 @@ def title_words(told: StationsRecord) -> str:
     way = (
         "" if told.way_m is None else f", {1e3 * told.way_m:.0f} mm from first to last"
     )
-    return f"{count_words(n, word)} of one {told.head}{way}"
+    by = "" if carried is None else f" on a {carried.carrier}"
+    return f"{count_words(n, word)} of one {told.head}{by}{way}"
 
 
 def trade_lines(told: StationsRecord) -> list[str]:
