@@ -17,6 +17,7 @@ from planning.cli.declared.evaluate_declared import evaluate
 from planning.cli.declared.export_declared import export
 from planning.cli.declared.other_declared import (
     accept,
+    compare,
     report,
     sample,
     show,
@@ -92,6 +93,7 @@ def commands() -> None:
     plan verify face-plan/plan.json           recomputes every claim, checks again
     plan accept face-plan/plan.json           a maker's figures: ball bars, plates
     plan show face-plan/plan.json             every place in mesh axes, camera by camera
+    plan compare face-plan other-plan         two plans side by side
     plan report face-plan                     one HTML file: rig, causes, tables
     plan tolerance face-plan --mount 2mm,0.2deg
                                               how well devices must be mounted
@@ -109,7 +111,7 @@ def commands() -> None:
 
 for _command in (
     *(rig_command, evaluate, verify, accept, show, reconstruct, tolerance, export),
-    *(report, lens, calibrate, play, rigs, schema, sample),
+    *(compare, report, lens, calibrate, play, rigs, schema, sample),
 ):
     commands.add_command(_command)
 

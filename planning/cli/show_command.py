@@ -1,4 +1,4 @@
-"""What `plan show` and `plan report` do with a plan as written: words, or a page."""
+"""What `plan show`, `compare` and `report` do with plans as written: words, a page."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
@@ -19,6 +19,7 @@ from planning.verify.audit.devices.camera_figures import (
 )
 
 from .console import print_json
+from .lines.comparison import compared, comparison_lines
 
 # Beside what the plan says: recomputed from its poses.
 _CAMERAS = "cameras"
@@ -67,6 +68,20 @@ def _section(plan: RigPlan, name: str, threads: int | None) -> list[str]:
     figures = camera_figures(plan, threads=threads or n_threads())
     lines = [line for camera in figures for line in _camera_lines(camera)]
     return ["CAMERAS: what each sees of the target, and how well.", *lines, ""]
+
+
+def compare_command(options: Mapping[str, Any]) -> int:
+    """Print two plans side by side."""
+    files = options["first"], options["second"]
+    plans = [RigPlan.load(file) for file in files]
+    rows = compared(*plans)
+    if options["as_json"]:
+        found = [asdict(row) | {"differs": row.differs} for row in rows]
+        print_json({"plans": [str(file) for file in files], "rows": found})
+        return 0
+    names = str(files[0].parent), str(files[1].parent)
+    click.echo("\n".join(comparison_lines(rows, names)))
+    return 0
 
 
 def report_command(options: Mapping[str, Any]) -> int:

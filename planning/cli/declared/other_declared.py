@@ -110,6 +110,21 @@ def show(**options: Any) -> None:  # noqa: ANN401
 
 
 @click.command()
+@click.argument("first", type=PlanFile(), metavar="A[/plan.json]")
+@click.argument("second", type=PlanFile(), metavar="B[/plan.json]")
+@output_options
+def compare(**options: Any) -> None:  # noqa: ANN401
+    """Tell two plans side by side; what differs is marked.
+
+    What was asked, what stands, what is proved of fewer, what is measured and what the
+    check found, each as the plan says: `plan verify` holds it true.
+    """
+    from planning.cli.show_command import compare_command
+
+    run(lambda: compare_command(options), debug=options["debug"])
+
+
+@click.command()
 @click.argument("plan_file", type=PlanFile(), metavar="DIR[/plan.json]")
 @click.option(
     "-o",
