@@ -13,11 +13,22 @@ from planning.cameras.stations.turntable import table_lattice
 from planning.cameras.stations.turntable.table_lattice import TableLattice, about_axis
 from planning.cameras.stations.turntable.table_sets import TableSets
 from planning.model.device_poses import moved_to
-from planning.model.errors import InfeasibleLimitsError, InputError, PlanFileError
+from planning.model.errors import (
+    InfeasibleLimitsError,
+    InputError,
+    PlanFileError,
+    RigError,
+)
 from planning.report.summary.brief import brief
 from planning.scene.draws import DRAWS
 from planning.steps.prepare import prepared
 from planning.verify.audit.audit import audit_plan
+from planning.verify.reconstruction.render.mitsuba.scene_text import (
+    Shine,
+    Window,
+    scene_text,
+)
+from planning.verify.reconstruction.scanner import Scanner
 from planning.verify.verification import verify_plan
 
 _POST = {
@@ -140,6 +151,33 @@ def _wider(mesh):
     """The same solid, grown a good deal about its middle."""
     middle = mesh.vertices.mean(axis=0)
     return TriangleMesh(middle + 8.0 * (mesh.vertices - middle), mesh.faces)
+
+
+def test_a_path_traced_step_has_what_stands_there_at_that_step(among):
+    scanner = Scanner.of(among)
+    projector = scanner.projectors[0]
+    assert projector.station == "T1"
+    windows = [Window.whole(camera) for camera in scanner.cameras]
+    text = scene_text(scanner, Shine(projector, "dark.exr"), windows)
+    solids = [k for k, o in enumerate(scanner.obstacles) if o.station in ("", "T1")]
+    assert len(solids) == 4
+    for k in range(len(scanner.obstacles)):
+        assert (f"obstacle{k}.ply" in text) == (k in solids)
+    # Housings of the projector and of its own cameras.
+    there = among.document.stations.stations[0]
+    assert text.count('type="cube"') == 1 + len(there.cameras)
+
+
+@pytest.mark.parametrize("kind", ["obstacle", "zone"])
+def test_a_name_that_a_step_would_give_is_refused(kind):
+    name = "post (T12)"
+    zone = {"name": name, "centre_mm": [0.0, 900.0, 0.0], "size_mm": [9.0, 9.0, 9.0]}
+    tables = {
+        "obstacle": {"obstacle": [_CLAMP | {"name": name}]},
+        "zone": {"workspace": {"keep_out": [zone]}},
+    }
+    with pytest.raises(RigError, match="call it otherwise"):
+        table_rig(**tables[kind])
 
 
 def test_few_of_a_model_are_before_the_table_at_once(few):

@@ -3,7 +3,6 @@
 from dataclasses import replace
 from pathlib import Path
 
-from planning.model.bodies import Obstacle
 from planning.model.planned import PlannedCamera
 from planning.verify.reconstruction.render.mitsuba.materials import Surface
 from planning.verify.reconstruction.render.mitsuba.scene_files import write_scenes
@@ -71,7 +70,12 @@ def write_mitsuba(
             for camera, moved in zip(of_plan.cameras, cameras, strict=True)
         ),
         mesh=rig.mesh,
-        obstacles=tuple(Obstacle(name, mesh) for name, mesh in rig.obstacles.items()),
+        obstacles=tuple(
+            replace(solid, mesh=mesh)
+            for solid, mesh in zip(
+                of_plan.obstacles, rig.obstacles.values(), strict=True
+            )
+        ),
     )
     room = of_plan.limits.check.ambient if ambient is None else ambient
     scenes = write_scenes(scanner, folder, surface, ambient=room)

@@ -1,5 +1,6 @@
 """The head, the turntable and the stations of a rig, and whether they can be."""
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
@@ -16,6 +17,8 @@ Optics = Callable[[Kind, str], DeviceModel]
 # Shares of the volume below which a user is told: the maker's field is another.
 _MOST_OF_IT = 0.9
 _OWN = ("body", "mount", "count")
+# As plans name what stands still about a turntable at its steps.
+_STEP = re.compile(r" \(T\d+\)$")
 
 
 def head_of(table: RigTable, optics: Optics) -> Head | None:
@@ -98,6 +101,13 @@ def _carried(table: RigTable) -> Iterator[str]:
             yield (
                 f"[turntable] still names {name!r}, which is no [[obstacle]]; there "
                 f"are: {names}. Keep-out volumes stand still anyway"
+            )
+    solid = known | {zone.name for zone in table.workspace.keep_out}
+    for name in sorted(solid) if table.turntable else ():
+        if _STEP.search(name):
+            yield (
+                f"{name!r} is named as what stands still is named at a "
+                f"step of the [turntable]; call it otherwise"
             )
     if table.head is None:
         return

@@ -241,12 +241,14 @@ def _before(body: Body | None) -> float:
 def _dark(scanner: Scanner, shining: ProjectorCalibration | None) -> list[str]:
     """Housings and obstacles, which reflect nothing.
 
-    The housing of the projector that shines ends at its optical centre.
+    The housing of the projector that shines ends at its optical centre; what stands at
+    other stations isn't there.
     """
+    stations = ("",) if shining is None else ("", shining.station)
     black = '<bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf>'
     shapes: list[str] = []
     for device in (*scanner.projectors, *scanner.cameras):
-        if device.body is None:
+        if device.body is None or device.station not in stations:
             continue
         middle, half = np.array(device.body.centre_m), np.array(device.body.half_m)
         low, high = middle - half, middle + half
@@ -260,8 +262,10 @@ def _dark(scanner: Scanner, shining: ProjectorCalibration | None) -> list[str]:
         shapes.append(
             _tag("shape", "cube", _pose(device.world_from_device @ box), black)
         )
-    for name in obstacle_names(scanner):
-        shapes.append(_tag("shape", "ply", _value("string", "filename", name), black))
+    for name, solid in zip(obstacle_names(scanner), scanner.obstacles, strict=True):
+        if solid.station in stations:
+            file = _value("string", "filename", name)
+            shapes.append(_tag("shape", "ply", file, black))
     return shapes
 
 
