@@ -9,6 +9,7 @@ from threadpoolctl import threadpool_limits
 from geometry.mesh.mesh import TriangleMesh
 from geometry.parallel import n_threads
 from planning.model.document.certificates import CamerasBy
+from planning.model.document.family_records import AlignedBy
 from planning.model.document.ring_records import RingAxis
 from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
 from planning.model.progress import TIME_IS_UP, Report, Stopwatch
@@ -28,6 +29,8 @@ from .steps.best_kept import Keep, Search, best_kept
 from .steps.cameras_alone.stages import planned_alone
 from .steps.carried import devices_of_heads, pattern_of_rig
 from .steps.checked import axes_may_help, missed_by, with_check
+from .steps.family.family_plan import with_members
+from .steps.family.family_search import family_sought, write_family
 from .steps.heads import heads_sought
 from .steps.joint.joining import jointly
 from .steps.prepare import prepared, request_of, standing_devices
@@ -52,6 +55,8 @@ def plan_rig(
     mesh: TriangleMesh | Sequence[TriangleMesh] | RangedBody,
     rig: Rig,
     *,
+    align: AlignedBy = "given",
+    family_quantile: float = 1.0,
     max_projectors: int | None = None,
     max_cameras: int | None = None,
     max_heads: int | None = None,
@@ -87,9 +92,13 @@ def plan_rig(
     """Plan the projectors and cameras that measure a surface, and check the plan.
 
     Args:
-        mesh: The surface, in metres; one for now. Or the body that `read_ranges` found:
-            then limits are tightened by what isn't known of it.
+        mesh: The surface, in metres. Several: a family that one rig serves, member by
+            member (`docs/use/family.md`). Or the body that `read_ranges` found: then
+            limits are tightened by what isn't known of it.
         rig: Devices and limits, from `load_rig`.
+        align: How members of a family are laid over the first: as `given`, by principal
+            `axes`, or by `icp`.
+        family_quantile: Share of the members that the rig must serve, in (0, 1].
         max_projectors: Projectors at most; None, and no heads either: the fixed devices
             and those of the rig file are evaluated as they stand. None is sought or
             moved, nothing is proved of their number, and limits of the workspace that
@@ -181,7 +190,13 @@ def plan_rig(
         threadpool_limits(1),
     ):
         request = replace(
-            request_of(mesh, rig, wishes, clock, select=select, weight=weight),
+            request_of(
+                *(mesh, rig, wishes, clock),
+                select=select,
+                weight=weight,
+                align=align,
+                family_quantile=family_quantile,
+            ),
             seed=seed,
             threads=threads or n_threads(),
             command=tuple(command),
@@ -191,6 +206,8 @@ def plan_rig(
             evaluates=evaluates,
         )
         check_request(request)
+        if request.family is not None:
+            return _of_family(request, clock, keep, checked, check, on_miss)
         planned = jointly(_evaluated if evaluates else robustly(_planned))
         if wishes.pattern == "none":
             planned = planned_alone
@@ -204,6 +221,28 @@ def plan_rig(
                 if not other.document.truncated:
                     other = _checked(other, request.threads, clock, keep, checked)
                     plan = plan if missed_by(other, check=True) else other
+    missed = missed_by(plan, check=check)
+    if missed and on_miss == "raise":
+        raise RequirementError(plan, missed)
+    return plan
+
+
+def _of_family(
+    request: PlanRequest,
+    clock: Stopwatch,
+    keep: Keep | None,
+    checked: Checked | None,
+    check: bool,
+    on_miss: Literal["raise", "return"],
+) -> RigPlan:
+    """The rig of a family, each member's plan checked by itself."""
+    plan, _ = best_kept(family_sought(request, clock), write_family, clock, keep)
+    if check and not plan.document.truncated:
+        members = [
+            _checked(member, request.threads, clock, None, checked)
+            for member in plan.members
+        ]
+        plan = with_members(plan, members)
     missed = missed_by(plan, check=check)
     if missed and on_miss == "raise":
         raise RequirementError(plan, missed)

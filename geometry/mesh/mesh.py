@@ -101,14 +101,21 @@ class TriangleMesh:
 
     @classmethod
     def joined(cls, meshes: Sequence["TriangleMesh"]) -> "TriangleMesh":
-        """Return several meshes as one, their faces one after the other."""
+        """Return several meshes as one, their faces one after the other.
+
+        What is a main body, and what a fragment, each of them says for itself.
+        """
         ends = np.cumsum([len(mesh.vertices) for mesh in meshes])
         faces = [
             mesh.faces + end - len(mesh.vertices)
             for mesh, end in zip(meshes, ends, strict=True)
         ]
         vertices = np.concatenate([mesh.vertices for mesh in meshes])
-        return cls(vertices, np.concatenate(faces))
+        together = cls(vertices, np.concatenate(faces))
+        together.__dict__["main"] = _read_only(
+            np.concatenate([mesh.main for mesh in meshes])
+        )
+        return together
 
     @cached_property
     def corners(self) -> Array:

@@ -199,7 +199,7 @@ def _keeping_floors(
 
     What counts is a share of what is lit, which is no less than what can be measured.
     """
-    regions = RegionFloors.of(samples.scene, samples.lit.target)
+    regions = RegionFloors.of(samples.scene, samples.lit.target, "camera")
     if not regions.share:
         return []
 
@@ -222,7 +222,7 @@ def _keeping_pairs(
     if asked is None:
         return []
     scene, lit, share = samples.scene, samples.lit, samples.scene.requirements.coverage
-    regions = RegionFloors.of(scene, lit.target)
+    regions = RegionFloors.of(scene, lit.target, "camera")
     left = [
         np.any(np.delete(lit.lit, p, axis=1), axis=1) for p in range(lit.lit.shape[1])
     ]

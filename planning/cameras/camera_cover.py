@@ -195,7 +195,7 @@ def candidate_cover(
         seed=scene.seed,
         max_count=required.max_cameras,
         n_existing=n_fixed(scene),
-        regions=RegionFloors.of(scene, samples.target),
+        regions=RegionFloors.of(scene, samples.target, "camera"),
         stock=DeviceStock.of(cameras, required.stock_of("camera")),
     )
 

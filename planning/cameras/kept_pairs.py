@@ -62,7 +62,7 @@ def rings_uphold(
     lit = samples.lit
     left = [np.any(np.delete(lit, p, axis=1), axis=1) for p in range(lit.shape[1])]
     reached = np.stack([lit.any(axis=1), *(left if asked.survive else [])], axis=1)
-    regions = RegionFloors.of(scene, samples.target)
+    regions = RegionFloors.of(scene, samples.target, "camera")
     share = scene.requirements.coverage
     demand = PairDemand.of(asked, regions, reached, _MORE * share, spare=1.0)
     kept = demand.kept(measuring_pairs(scene, cameras, samples))

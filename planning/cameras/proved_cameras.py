@@ -79,7 +79,7 @@ def bound_stage(
         free,
         scene.requirements.coverage,
         samples.target.samples.weight * n_samples,
-        RegionFloors.of(scene, samples.target).take(np.arange(n)),
+        RegionFloors.of(scene, samples.target, "camera").take(np.arange(n)),
     )
     lit = taken(samples, wanted, samples.lit)
     bound = bound_cameras(scene, devices, lit, question, effort)

@@ -88,7 +88,7 @@ def surer_cameras(
     start = list(range(first, first + len(cameras)))
     before = errors.measured(start)
     reached = np.any(np.isfinite(errors.sigma), axis=1)
-    floors = RegionFloors.of(scene, samples.target)
+    floors = RegionFloors.of(scene, samples.target, "camera")
     kept = Quotas.of(floors, reached, 0.0, spare=1.0).as_far_as(before)
     total = int(before.sum()) + int(np.ceil(aim.more * reached.sum()))
 

@@ -156,7 +156,7 @@ class _PairsOfAll:
         offered = stage.cover.candidates
         views = offered.on(samples.target)
         pairs = measuring_pairs(scene, offered.cameras, samples, views)
-        regions = RegionFloors.of(scene, samples.target)
+        regions = RegionFloors.of(scene, samples.target, "camera")
         return cls(scene, offered.cameras, samples.target, regions, pairs)
 
     @property
@@ -169,7 +169,7 @@ class _PairsOfAll:
         return replace(
             self,
             target=target,
-            regions=RegionFloors.of(self.scene, target),
+            regions=RegionFloors.of(self.scene, target, "camera"),
             pairs=np.concatenate([self.pairs, other.pairs]),
         )
 

@@ -36,10 +36,25 @@ class RigPlan:
     Attributes:
         document: What `plan.json` holds.
         surface: The surface that its claims speak about.
+        members: Of a family's plan each member's own; else none.
     """
 
     document: PlanDocument
     surface: Surface
+    members: tuple["RigPlan", ...] = ()
+
+    @property
+    def served(self) -> tuple[tuple[str, "RigPlan"], ...]:
+        """Name and plan of each member that the rig must serve; none: no family."""
+        family = self.document.family
+        if family is None:
+            return ()
+        pairs = zip(self.document.members, self.members, strict=True)
+        return tuple(
+            (record.name, plan)
+            for m, (record, plan) in enumerate(pairs)
+            if m not in family.left_out
+        )
 
     @property
     def requirements(self) -> Requirements:
@@ -99,7 +114,7 @@ class RigPlan:
         return hashlib.sha256(json.dumps(planned).encode()).hexdigest()
 
     def save(self, path: str | Path) -> None:
-        """Write the plan, and `surface.npz` beside it.
+        """Write the plan, and `surface.npz` beside it; of a family all members' too.
 
         Args:
             path: Where `plan.json` goes; its folder is made if need be.
@@ -109,6 +124,9 @@ class RigPlan:
         """
         path = Path(path)
         path.parent.mkdir(parents=True, exist_ok=True)
+        # A plan whose members aren't there yet is no plan of a family.
+        for record, member in zip(self.document.members, self.members, strict=False):
+            member.save(path.parent / record.path)
         surface = path.parent / self.document.surface.path
         write_together(
             {
@@ -159,7 +177,30 @@ class RigPlan:
                     f"{path}: reference_{kind}_models of {surface.path} names models "
                     f"{models.min()} to {models.max()}, the rig has {n}; plan again"
                 )
-        return cls(document, loaded)
+        return cls(document, loaded, cls._members(path, document))
+
+    @classmethod
+    def _members(cls, path: Path, document: PlanDocument) -> tuple[Self, ...]:
+        """Read the plans of a family's members, which lie below the family's."""
+        if document.family is None:
+            return ()
+        members: list[Self] = []
+        for record in document.members:
+            if record.path != member_path(record.name):
+                raise PlanFileError(
+                    f"{path}: member {record.name!r} lies in {record.path!r}, must be "
+                    f"{member_path(record.name)!r}; plan again"
+                )
+            member = cls.load(path.parent / record.path)
+            if member.members:
+                raise PlanFileError(f"{path}: a member is a family itself; plan again")
+            members.append(member)
+        return tuple(members)
+
+
+def member_path(name: str) -> str:
+    """Return where the plan of a member lies, beside the plan of the family."""
+    return f"members/{name}/plan.json"
 
 
 def _require_plan(content: bytes, path: Path) -> None:

@@ -69,7 +69,7 @@ class Search:
             fresh = candidates.scene.target_samples(DRAWS.fresh_projectors.later(draw))
             some = fresh.take(np.arange(0, len(fresh), _JOINING))
             candidates = candidates.with_samples(candidates.on(some))
-            if candidates.scene.requirements.region_coverage:
+            if candidates.scene.has_floors:
                 # Floors leave little to spare: what nearly did is where to look on.
                 begun = np.union1d(begun, selection.chosen)
 
@@ -151,7 +151,7 @@ def confirms(
     samples = scene.target_samples(DRAWS.fresh_projectors.later(draw))
     n = len(samples)
     more = scene.more_of_regions(samples, DRAWS.fresh_regions.later(draw))
-    if scene.requirements.region_coverage and more is not None:
+    if scene.has_floors and more is not None:
         samples = merged(samples, more)
     lit = CandidateSet.over(scene, samples, tuple(projectors)).reached
     reached, dark = lit.copy(), samples.take(~lit)

@@ -24,7 +24,7 @@ def confirms_losses(
     """
     scene, samples, n = candidates.scene, fresh, len(fresh)
     more = scene.more_of_regions(samples, DRAWS.surviving_regions)
-    if scene.requirements.region_coverage and more is not None:
+    if scene.has_floors and more is not None:
         samples = merged(samples, more)
     taken = CandidateSet.over(scene, samples, tuple(projectors))
     reached, dark = taken.reached.copy(), samples.take(~taken.reached)

@@ -40,7 +40,7 @@ def prove_fewest(
     """
     source = CandidateSource(scene, templates)
     while stage.certificate.needed.count > stage.certificate.given:
-        bound = _bound_of(scene, stage, templates, effort)
+        bound = bound_of(scene, stage, templates, effort)
         offered = source.towards(bound.directions)
         better = _with_more(stage, offered) if offered else stage
         if better is stage:
@@ -68,12 +68,13 @@ def _with_more(
     return better if better.certificate.needed.count < before else stage
 
 
-def _bound_of(
+def bound_of(
     scene: Scene,
     stage: ProjectorStage,
     templates: tuple[PlannedProjector, ...],
     effort: Effort,
 ) -> ContinuousBound:
+    """Bound the projectors of a stage over every pose of the workspace."""
     # The first samples are a draw of their own; the others came where it overfitted.
     samples = stage.candidates.samples
     n = min(len(samples), effort.most_samples or len(samples))

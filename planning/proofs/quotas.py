@@ -1,5 +1,7 @@
 """How much devices must cover of samples: of all, and of each region with a floor.
 
+Members of a family are such regions, with the share of all as their floor.
+
 With n the samples that candidates cover and n_r those of them on region r, a share S of
 all and the floor F of every large region::
 
@@ -14,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.scene.placed_bodies import Kind
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
@@ -35,16 +38,11 @@ class RegionFloors:
     share: float = 0.0
 
     @classmethod
-    def of(cls, scene: Scene, samples: Target) -> "RegionFloors":
-        """Return the floors of a scene's large regions, on samples."""
-        share = scene.requirements.region_coverage
-        if not share:
-            return cls.none(len(samples))
-        number = np.zeros(int(scene.region.max(initial=-1)) + 2, dtype=np.int64)
-        large = scene.large_regions
-        # Faces of no region count as the last.
-        number[large] = 1 + np.arange(large.size)
-        return cls(number[scene.region[samples.samples.faces]], 1 + large.size, share)
+    def of(
+        cls, scene: Scene, samples: Target, kind: Kind = "projector"
+    ) -> "RegionFloors":
+        """Return the floors of a scene's large regions, or members, on samples."""
+        return cls(*scene.floor_rows(samples, kind))
 
     @classmethod
     def none(cls, n: int) -> "RegionFloors":

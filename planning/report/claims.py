@@ -142,7 +142,7 @@ def _blocked(
             projector,
             samples.take(dark),
             scene.requirements.projector,
-            scene.visibility,
+            scene.occlusion,
             bodies=standing.bodies,
         )
         obstructed = dark[first == projector_limits.OBSTRUCTED]

@@ -1,5 +1,6 @@
 """A plan in the making: what was ordered, and the stages as far as they came."""
 
+import math
 from dataclasses import dataclass, field, replace
 
 from geometry.mesh.mesh import TriangleMesh
@@ -7,6 +8,7 @@ from geometry.parallel import n_threads
 from geometry.regions.regions import DominantRegions
 from planning.cameras.proved_cameras import CameraStage
 from planning.model.document.certificates import CamerasBy
+from planning.model.document.family_records import AlignedBy, AlignmentRecord
 from planning.model.document.ring_records import AxisTaken, RingAxis
 from planning.model.document.station_records import Stationed
 from planning.model.planned import PlannedCamera, PlannedProjector
@@ -24,6 +26,30 @@ from planning.scene.scene import Scene
 
 
 @dataclass(frozen=True, eq=False)
+class FamilyRequest:
+    """Several meshes for one rig.
+
+    Attributes:
+        names: Of each, all different; they name folders.
+        meshes: Where each stands before the rig.
+        alignments: What moved them there.
+        align: How that was found.
+        quantile: Share of them that must be served.
+    """
+
+    names: tuple[str, ...]
+    meshes: tuple[TriangleMesh, ...]
+    alignments: tuple[AlignmentRecord, ...]
+    align: AlignedBy = "given"
+    quantile: float = 1.0
+
+    @property
+    def n_asked(self) -> int:
+        """Members that must be served."""
+        return math.ceil(self.quantile * len(self.names) - 1e-9)
+
+
+@dataclass(frozen=True, eq=False)
 class PlanRequest:
     """What is asked: the mesh, the rig, the wishes, and how to go about it.
 
@@ -36,6 +62,7 @@ class PlanRequest:
         evaluates: Whether these are all there will be.
         axis_wanted: Where ring axes stand after all; None: as was asked.
         least_projectors: Projectors at least, though fewer light enough.
+        family: The members, of which the mesh holds all; None: it is one mesh.
     """
 
     mesh: TriangleMesh
@@ -52,6 +79,7 @@ class PlanRequest:
     evaluates: bool = False
     axis_wanted: RingAxis | None = None
     least_projectors: int = 0
+    family: FamilyRequest | None = None
 
     @property
     def ring_axis(self) -> RingAxis | None:

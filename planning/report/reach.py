@@ -31,7 +31,7 @@ def furthest_lit(
             projector,
             dark,
             scene.requirements.projector,
-            scene.visibility,
+            scene.occlusion,
             bodies=scene.bodies,
         )
         furthest[pending] = np.maximum(furthest[pending], stage)

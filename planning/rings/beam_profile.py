@@ -4,6 +4,7 @@ Each column of the grid is an azimuth about the ring axis, each row a ring coord
 the tangent R (diverging light) or the radius in [m] (parallel light).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +20,7 @@ from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
 _AZIMUTHS = 360
+_GRIDS = "heights", "lit", "target", "faces", "points"
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +42,15 @@ class BeamProfile:
     target: NDArray[np.bool_]
     faces: NDArray[np.int64]
     points: NDArray[np.float64]
+
+    @classmethod
+    def joined(cls, profiles: Sequence["BeamProfile"]) -> "BeamProfile":
+        """Return where the same light meets several surfaces, column after column.
+
+        Each face is then one of the surface that its column is of.
+        """
+        every = [[getattr(one, name) for one in profiles] for name in _GRIDS]
+        return cls(profiles[0].coordinates, *(np.concatenate(g, axis=1) for g in every))
 
     @property
     def on_object(self) -> NDArray[np.bool_]:

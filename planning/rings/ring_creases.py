@@ -68,7 +68,7 @@ def crease_errors(
             projector,
             target,
             scene.requirements.projector,
-            scene.visibility,
+            scene.occlusion,
             bodies=scene.bodies,
         )
         lit &= stage == LIT

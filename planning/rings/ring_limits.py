@@ -1,5 +1,6 @@
 """One projector's light on the surface, and what it says of the gaps of its rings."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -46,6 +47,20 @@ class RingBeam:
     errors: NDArray[np.float64]
     counted: NDArray[np.bool_]
     lit: NDArray[np.bool_]
+
+    @classmethod
+    def joined(cls, beams: Sequence["RingBeam"]) -> "RingBeam":
+        """Return how the same light meets several surfaces, one at a time."""
+        if len(beams) == 1:
+            return beams[0]
+        return cls(
+            beams[0].projector,
+            beams[0].edges,
+            BeamProfile.joined([beam.profile for beam in beams]),
+            np.concatenate([beam.errors for beam in beams], axis=1),
+            np.concatenate([beam.counted for beam in beams], axis=1),
+            np.any([beam.lit for beam in beams], axis=0),
+        )
 
     @property
     def even_gap(self) -> float:

@@ -41,11 +41,48 @@ _ROUNDS = 3
 
 @dataclass(frozen=True, eq=False)
 class RingStage:
-    """Projectors with their final rings, the even radii, and `rings` of the plan."""
+    """Projectors with their final rings, and `rings` of the plan.
+
+    Attributes:
+        projectors: Without the rings that would light nothing.
+        even: With evenly spaced rings.
+        spaced: With all that were spaced, idle or not.
+        kept_even: Places of those that keep even rings, since samples would be lost.
+        records: What the plan says of each; none of a family, whose members say it.
+    """
 
     projectors: tuple[PlannedProjector, ...]
-    even_radii: tuple[NDArray[np.float64], ...]
-    records: tuple[RingsRecord, ...]
+    even: tuple[PlannedProjector, ...]
+    spaced: tuple[PlannedProjector, ...]
+    kept_even: frozenset[int] = frozenset()
+    records: tuple[RingsRecord, ...] = ()
+
+    @property
+    def even_radii(self) -> tuple[NDArray[np.float64], ...]:
+        """The radii of evenly spaced rings."""
+        return tuple(projector.ring_radii for projector in self.even)
+
+    def on(self, scene: Scene) -> "RingStage":
+        """Return the same rings, with what is to be said of them on one surface."""
+        creases = _creases(scene)
+        records: list[RingsRecord] = []
+        for p, spaced in enumerate(self.spaced):
+            record = rings_record(
+                scene,
+                ring_beam(scene, _evenly(self.even[p]), creases),
+                spaced,
+                creases,
+                kept_even=p in self.kept_even,
+            )
+            records.append(self.without_idle(p, record))
+        return replace(self, records=tuple(records))
+
+    def without_idle(self, p: int, record: RingsRecord) -> RingsRecord:
+        """Return what is said of a projector's rings, with those left out."""
+        left = np.setdiff1d(self.spaced[p].ring_radii, self.projectors[p].ring_radii)
+        if not left.size:
+            return record
+        return record.changed(left_out=tuple(np.round(left, DECIMALS).tolist()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,34 +114,40 @@ def space_rings(
     """
     even = tuple(projectors)
     steady = tuple(_evenly(projector) for projector in even)
-    creases = find_creases(scene.mesh, 0.5 * scene.mesh.mean_edge)
-    beams = tuple(ring_beam(scene, projector, creases) for projector in steady)
+    surfaces = [(surface, _creases(surface)) for surface in scene.surfaces]
+    beams = tuple(
+        RingBeam.joined([ring_beam(one, projector, sharp) for one, sharp in surfaces])
+        for projector in steady
+    )
     if proved is not None:
         beams = tuple(b.with_lit(_lit_at(b, proved, p)) for p, b in enumerate(beams))
     final, losing = even, frozenset[int]()
     if spacing == "curvature":
         final, losing = _spaced(scene, even, cameras, beams)
-    records = tuple(
-        rings_record(
-            scene,
-            beam,
-            final[p],
-            creases,
-            kept_even=p in losing and not even[p].keeps_rings,
-        )
-        for p, beam in enumerate(beams)
-    )
-    shown, parts = list(final), list(records)
+    shown = list(final)
     for p, beam in enumerate(beams):
         idle = idle_rings(scene, final[p], beam.profile, margin)
         if idle.any():
-            radii = final[p].ring_radii
-            shown[p] = replace(final[p], ring_radii=radii[~idle])
-            parts[p] = records[p].changed(
-                left_out=tuple(np.round(radii[idle], DECIMALS).tolist())
-            )
-    even_radii = tuple(p.ring_radii for p in even)
-    return RingStage(tuple(shown), even_radii, tuple(parts))
+            shown[p] = replace(final[p], ring_radii=final[p].ring_radii[~idle])
+    kept = frozenset(p for p in losing if not even[p].keeps_rings)
+    stage = RingStage(tuple(shown), even, final, kept)
+    if len(surfaces) > 1:
+        return stage
+    ((_, creases),) = surfaces
+    records = (
+        rings_record(scene, beam, final[p], creases, kept_even=p in kept)
+        for p, beam in enumerate(beams)
+    )
+    return replace(
+        stage,
+        records=tuple(
+            stage.without_idle(p, record) for p, record in enumerate(records)
+        ),
+    )
+
+
+def _creases(scene: Scene) -> Creases:
+    return find_creases(scene.mesh, 0.5 * scene.mesh.mean_edge)
 
 
 def tolerance_m(requirements: Requirements) -> float:

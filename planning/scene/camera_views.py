@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.rays.visibility_matrix import visibility_matrix
 from planning.model.planned import PlannedCamera
 from planning.scene.limits.camera_limits import ViewedSamples
 
@@ -58,13 +57,8 @@ def camera_views(
         wanted[row, sight.samples] = True
         offered.append(sight)
     samples = target.samples
-    free = visibility_matrix(
-        scene.visibility,
-        np.stack([camera.world_from_device[:3, 3] for camera in cameras]),
-        samples.points,
-        samples.normals,
-        candidates=wanted,
-    )
+    centres = np.stack([camera.world_from_device[:3, 3] for camera in cameras])
+    free = scene.occlusion.seen(centres, target, candidates=wanted)
     views: list[CameraView] = []
     for sight, camera, row in zip(offered, cameras, free, strict=True):
         clear = np.flatnonzero(row[sight.samples])
@@ -77,7 +71,7 @@ def camera_views(
 def view_of(scene: Scene, camera: PlannedCamera, target: Target) -> ViewedSamples:
     """Return how a camera sees samples, everything in between included."""
     limits = scene.requirements.camera
-    return measurability.view(camera, target, limits, scene.visibility, scene.bodies)
+    return measurability.view(camera, target, limits, scene.occlusion, scene.bodies)
 
 
 class CandidateViews:

@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 
 from geometry.poses import inverse, transform
 from geometry.rays.rays import equal_parts
-from geometry.rays.visibility import Visibility
-from geometry.rays.visibility_matrix import visibility_matrix
 from planning.model.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 from planning.scene.limits.limit import first_violated
@@ -22,6 +20,7 @@ from planning.scene.limits.projector_limits import (
 )
 
 from .lights import light_of
+from .occlusion import Occlusion
 from .placed_bodies import Blocker, blocked_by, first_blocked
 from .samples import LightOnSamples, SampleColumns, Target
 from .scene import Scene
@@ -47,18 +46,18 @@ def first_failure(
     projector: PlannedProjector,
     target: Target,
     limits: ProjectorLimits,
-    visibility: Visibility | None,
+    occlusion: Occlusion | None,
     *,
     bodies: Sequence[Blocker] = (),
 ) -> NDArray[np.int8]:
     """Return the index in `CAUSES` of the first limit that fails; `LIT` if none does.
 
-    Shape (n,). Without `visibility`, occlusion by the mesh is left out.
+    Shape (n,). Without `occlusion`, that by the mesh is left out.
     """
     first = _ignoring_occlusion(projector, SampleColumns.of(target), limits)
-    if visibility is not None:
+    if occlusion is not None:
         clear = np.flatnonzero(first == LIT)
-        hidden = _in_shadow(projector, target.take(clear), visibility)
+        hidden = _in_shadow(projector, target.take(clear), occlusion)
         first[clear[hidden]] = OCCLUDED
     _mark_blocked(first, projector, target.samples.points, bodies)
     return first
@@ -68,22 +67,18 @@ def stands_between(
     scene: Scene, projector: PlannedProjector, target: Target
 ) -> NDArray[np.bool_]:
     """Return from which samples surface or bodies keep the light, shape (n,)."""
-    hidden = _in_shadow(projector, target, scene.visibility)
+    hidden = _in_shadow(projector, target, scene.occlusion)
     blocked = blocked_by(scene.bodies, projector, target.samples.points)
     return hidden | blocked.any(axis=1)
 
 
 def _in_shadow(
-    projector: PlannedProjector, target: Target, visibility: Visibility
+    projector: PlannedProjector, target: Target, occlusion: Occlusion
 ) -> NDArray[np.bool_]:
     """Return which samples the surface hides from a projector, shape (n,)."""
-    samples, pose = target.samples, projector.world_from_device
-    return visibility.blocked(
-        pose[:3, 3],
-        samples.points,
-        samples.normals,
-        along=light_of(projector.device).common_direction(pose),
-    )
+    pose = projector.world_from_device
+    along = light_of(projector.device).common_direction(pose)
+    return occlusion.blocked(pose[:3, 3], target, along=along)
 
 
 def lit_stages(
@@ -98,25 +93,22 @@ def lit_stages(
         for row in range(part.start, part.stop):
             stages[row] = _ignoring_occlusion(projectors[row], samples, limits)
 
-    scene.visibility.caster.share(fill, equal_parts(len(projectors), _SHARED))
+    scene.occlusion.share(fill, equal_parts(len(projectors), _SHARED))
     first = np.ascontiguousarray(stages.T)
-    points, normals = target.samples.points, target.samples.normals
     for kind in {projector.light: None for projector in projectors}:
         alike = [i for i, p in enumerate(projectors) if p.light == kind]
         poses = np.stack([projectors[i].world_from_device for i in alike])
         lit = first[:, alike] == LIT
-        seen = visibility_matrix(
-            scene.visibility,
+        seen = scene.occlusion.seen(
             poses[:, :3, 3],
-            points,
-            normals,
+            target,
             along=light_of(projectors[alike[0]].device).common_direction(poses),
             candidates=np.ascontiguousarray(lit.T),
         )
         shadowed = lit & ~seen.T
         first[:, alike] = np.where(shadowed, np.int8(OCCLUDED), first[:, alike])
     for column, projector in enumerate(projectors):
-        _mark_blocked(first[:, column], projector, points, scene.bodies)
+        _mark_blocked(first[:, column], projector, target.samples.points, scene.bodies)
     return first
 
 

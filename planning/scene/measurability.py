@@ -22,7 +22,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.rays.visibility import Visibility
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import CameraLimits, TriangulationLimits
 from planning.scene.codes.surfaces import Coded, CodedPixels, PixelSurfaces
@@ -41,6 +40,7 @@ from planning.scene.limits.limit import first_violated
 from planning.scene.limits.pair_limits import PAIR_LIMITS
 from planning.scene.limits.pair_quality import PairQuality, Term
 
+from .occlusion import Occlusion
 from .placed_bodies import Blocker, first_blocked
 from .samples import LightOnSamples, Target
 
@@ -49,14 +49,14 @@ def view(
     camera: PlannedCamera,
     target: Target,
     limits: CameraLimits,
-    visibility: Visibility | None,
+    occlusion: Occlusion | None,
     bodies: Sequence[Blocker] = (),
 ) -> ViewedSamples:
-    """Return how a camera sees samples; without `visibility`, the mesh hides none."""
+    """Return how a camera sees samples; without `occlusion`, the mesh hides none."""
     rays = CameraRays.of(camera, target)
     first = first_violated(CAMERA_LIMITS, rays, limits, len(target))
     near = np.flatnonzero(first >= OCCLUDED)
-    between = first_between(camera, target.take(near), visibility, bodies)
+    between = first_between(camera, target.take(near), occlusion, bodies)
     first[near] = np.minimum(first[near], between)
     jacobian, off_centre = np.zeros((len(target), 3, 2)), np.zeros((len(target), 2))
     seen, turn, device = first == SEEN, camera.world_from_device[:3, :3], camera.device
@@ -72,15 +72,15 @@ def view(
 def first_between(
     camera: PlannedCamera,
     target: Target,
-    visibility: Visibility | None,
+    occlusion: Occlusion | None,
     bodies: Sequence[Blocker],
 ) -> NDArray[np.int8]:
     """Return the first limit that rays decide and samples violate; else `SEEN`."""
     points = target.samples.points
     first = first_blocked(bodies, camera, points, (BLOCKED, OBSTRUCTED), SEEN)
-    if visibility is not None:
-        place, normals = camera.world_from_device[:3, 3], target.samples.normals
-        first[visibility.blocked(place, points, normals)] = OCCLUDED
+    if occlusion is not None:
+        place = camera.world_from_device[:3, 3]
+        first[occlusion.blocked(place, target)] = OCCLUDED
     return first
 
 

@@ -20,6 +20,7 @@ from planning.scene.workspace.model_candidates import ModelCandidates
 from planning.scene.workspace.view_tiles import Site
 
 from .draws import DRAWS, Draw
+from .occlusion import Occlusion
 from .placed_bodies import (
     Blocker,
     Device,
@@ -71,8 +72,7 @@ class Scene:
 
     def among(self, devices: Iterable[Device]) -> "Scene":
         """Return the scene with the bodies of these devices, and no other planned."""
-        placed = bodies_of(device for device in devices if not device.existing)
-        return self._with(placed=placed) if placed or self.placed else self
+        return self.with_placed(bodies_of(one for one in devices if not one.existing))
 
     def less_one_obstacle(self) -> Iterator[tuple[str, "Scene"]]:
         """Yield what each obstacle is called, and the scene without it."""
@@ -81,9 +81,19 @@ class Scene:
             yield moved.words, self._with(obstructions=rest)
 
     @property
+    def surfaces(self) -> tuple["Scene", ...]:
+        """The scene of each surface that is measured by itself: this one."""
+        return (self,)
+
+    @property
+    def has_floors(self) -> bool:
+        """Whether parts of the target have quotas of their own."""
+        return bool(self.requirements.region_coverage)
+
+    @property
     def without_floors(self) -> "Scene":
         """The scene of which no region has a floor."""
-        if not self.requirements.region_coverage:
+        if not self.has_floors:
             return self
         return self._with(requirements=replace(self.requirements, region_coverage=0.0))
 
@@ -95,11 +105,18 @@ class Scene:
         """Return the scene with others standing about."""
         return self._with(obstructions=obstructions)
 
+    def with_placed(self, placed: tuple[PlacedBody, ...]) -> "Scene":
+        """Return the scene with other bodies of chosen devices."""
+        return self._with(placed=placed) if placed or self.placed else self
+
     def _with(self, **changes: object) -> "Scene":
         other = replace(self, **changes)
-        # What rays are cast against is the same mesh.
-        other.__dict__["visibility"] = self.visibility
+        self._carry(other)
         return other
+
+    def _carry(self, other: "Scene") -> None:
+        """Hand on what rays are cast against: it is the same mesh."""
+        other.__dict__["visibility"] = self.visibility
 
     @cached_property
     def safe_workspace(self) -> Workspace:
@@ -110,6 +127,11 @@ class Scene:
     def visibility(self) -> Visibility:
         """Occlusion by the mesh."""
         return Visibility(self.mesh, threads=self.threads)
+
+    @cached_property
+    def occlusion(self) -> Occlusion:
+        """The same, asked of samples."""
+        return Occlusion((self.visibility,))
 
     @cached_property
     def shell(self) -> MeshShell:
@@ -135,9 +157,26 @@ class Scene:
         least = self.requirements.region_share * areas[self.target_faces].sum()
         return np.flatnonzero(of_region >= least * (1.0 - 1e-9))
 
+    def floor_rows(
+        self, samples: Target, kind: Kind
+    ) -> tuple[NDArray[np.int64], int, float]:
+        """Return which part with a quota samples are of, how many, and the share.
+
+        Parts are large regions, from 1; 0 is of none, shape (n,). The share is that
+        which devices of a kind must cover of each part.
+        """
+        share = self.requirements.region_coverage
+        if not share:
+            return np.zeros(len(samples), dtype=np.int64), 1, 0.0
+        number = np.zeros(int(self.region.max(initial=-1)) + 2, dtype=np.int64)
+        large = self.large_regions
+        # Faces of no region count as the last.
+        number[large] = 1 + np.arange(large.size)
+        return number[self.region[samples.samples.faces]], 1 + large.size, share
+
     def region_samples(self, draw: Draw, region: int) -> Target:
         """Return area-true samples of a region, by a stream of its own."""
-        return self._samples(draw, self.region == region, region + 1)
+        return self.drawn(draw, self.region == region, region + 1)
 
     def more_of_regions(self, target: Target, draw: Draw) -> Target | None:
         """Draw what large regions lack of so many samples; None: they have enough."""
@@ -152,11 +191,11 @@ class Scene:
 
     def target_samples(self, draw: Draw) -> Target:
         """Return area-true samples of the target."""
-        return self._samples(draw, self.target_faces)
+        return self.drawn(draw, self.target_faces)
 
     def surface_samples(self, draw: Draw) -> Target:
         """Return area-true samples of the whole surface, by the draw's next stream."""
-        return self._samples(draw.later(1), None)
+        return self.drawn(draw.later(1), None)
 
     def site(self, kind: Kind, device: DeviceModel) -> Site | None:
         """Return what devices stand over side by side; None where the object fits."""
@@ -187,9 +226,8 @@ class Scene:
 
         return ModelCandidates(tuple(of(template) for template in templates))
 
-    def _samples(
-        self, draw: Draw, within: NDArray[np.bool_] | None, *part: int
-    ) -> Target:
+    def drawn(self, draw: Draw, within: NDArray[np.bool_] | None, *part: int) -> Target:
+        """Return area-true samples of some faces (None: of all), by a stream."""
         # SeedSequence mixes seed and stream, so neighbouring seeds share no draw.
         mixed = np.random.SeedSequence([self.seed, draw.stream, *part])
         samples = sample_surface(

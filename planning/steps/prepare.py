@@ -34,6 +34,8 @@ from planning.scene.placed_bodies import Obstruction, existing_devices
 from planning.scene.ranges.ranged_body import RangedBody
 from planning.scene.scene import Scene
 
+from .family.family_request import AlignedBy, check_members, family_of
+
 
 def request_of(
     mesh: TriangleMesh | Sequence[TriangleMesh] | RangedBody,
@@ -43,13 +45,15 @@ def request_of(
     *,
     select: Select | None,
     weight: Weight | None,
+    align: AlignedBy = "given",
+    family_quantile: float = 1.0,
 ) -> PlanRequest:
     """Return what is asked, of a surface whose long edges are cut.
 
     Limits of the rig are tightened by what isn't known of a body of ranges.
 
     Raises:
-        InputError: If the target is none, or there are several meshes.
+        InputError: If the target is none, or there is no mesh.
         InfeasibleLimitsError: If a body's ranges leave the limits no room.
     """
     selected = select is not None or weight is not None
@@ -59,20 +63,43 @@ def request_of(
         wishes = replace(wishes, target=_whole(wishes.target, selected))
         rig, guard = guarded(rig, mesh)
         mesh, ranges = mesh.mesh, (mesh, guard)
+    if not isinstance(mesh, TriangleMesh) and len(mesh) > 1:
+        family = family_of(mesh, align, family_quantile)
+        check_members(wishes, selected=selected)
+        wishes = replace(wishes, region_coverage=0.0)
+        meshes = tuple(_cut(one, clock)[0] for one in family.meshes)
+        family = replace(family, meshes=meshes)
+        together = TriangleMesh.joined(meshes)
+        return PlanRequest(together, rig, wishes, family=family)
+    if family_quantile != 1.0 or align != "given":
+        raise InputError(
+            "align and family_quantile are of several meshes on one rig, and there is "
+            "one: leave them out"
+        )
     surface = _single(mesh)
     if wishes.target == "surface" and selected:
         raise InputError("the whole surface and a selection both are targets: give one")
     interest = interest_of(surface, select, weight)
-    # Planned and judged on places, not on whatever triangles a flat face came in.
+    cut, parent = _cut(surface, clock)
+    if interest is not None:
+        interest = interest.on_parts(parent)
+    return PlanRequest(cut, rig, wishes, interest=interest, ranges=ranges)
+
+
+def _cut(
+    surface: TriangleMesh, clock: Stopwatch
+) -> tuple[TriangleMesh, NDArray[np.int64]]:
+    """Return a surface whose long edges are cut, and the triangle each part is of.
+
+    Planned and judged on places, not on whatever triangles a flat face came in.
+    """
     cut, parent = cut_for_curvature(surface)
     if len(cut.faces) > len(surface.faces):
         clock.say(
             f"  long edges cut: {len(surface.faces):,} triangles become "
             f"{len(cut.faces):,}, the surface stays"
         )
-    if interest is not None:
-        interest = interest.on_parts(parent)
-    return PlanRequest(cut, rig, wishes, interest=interest, ranges=ranges)
+    return cut, parent
 
 
 def _check_single(rig: Rig) -> None:
@@ -97,10 +124,8 @@ def _whole(target: str | None, selected: bool) -> TargetName:
 
 def _single(mesh: TriangleMesh | Sequence[TriangleMesh]) -> TriangleMesh:
     meshes = [mesh] if isinstance(mesh, TriangleMesh) else mesh
-    if len(meshes) != 1:
-        raise InputError(
-            f"{len(meshes)} meshes: one rig for several isn't built yet, give one"
-        )
+    if not meshes:
+        raise InputError("no mesh: give one, or several for one rig")
     return meshes[0]
 
 
@@ -112,14 +137,39 @@ def prepared(request: PlanRequest, clock: Stopwatch) -> Prepared:
         RigError: If an obstacle's file can't be read.
         InfeasibleLimitsError: If limits exclude each other.
     """
-    mesh, rig = request.mesh, request.rig
+    return prepared_for(request, *asked(request), clock)
+
+
+def asked(request: PlanRequest) -> tuple[Requirements, NDArray[np.float64]]:
+    """State what is asked, and the ring radii: what the rig has in vain comes first.
+
+    Raises:
+        InputError: If what is asked can't be together.
+        InfeasibleLimitsError: If limits exclude each other.
+    """
+    rig = request.rig
     if request.cameras_by == "paper" and len(rig.camera_models) > 1:
         raise InputError(
             f"cameras_by = 'paper': the paper's route is of cameras of one model, rig "
             f"{rig.name!r} has {len(rig.camera_models)}; take 'cover' or 'both'"
         )
-    # What the rig asks for in vain is told before the work.
-    requirements, radii = _resolve(request)
+    return _resolve(request)
+
+
+def prepared_for(
+    request: PlanRequest,
+    requirements: Requirements,
+    radii: NDArray[np.float64],
+    clock: Stopwatch,
+) -> Prepared:
+    """Find the regions of a mesh of which it is known what is asked.
+
+    Raises:
+        InputError: If nothing is curved enough to be a target.
+        RigError: If an obstacle's file can't be read.
+        InfeasibleLimitsError: If existing devices lack clearance.
+    """
+    mesh, rig = request.mesh, request.rig
     obstacles = rig.obstacles(requirements.workspace, mesh)
     with clock.stage("regions", "curvature and dominant regions"):
         field = principal_curvatures(mesh)

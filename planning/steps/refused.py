@@ -4,6 +4,7 @@ from planning.report.partial_plan import PlanRequest
 
 from .cameras_alone.refusals import check_alone
 from .carried import check_carried
+from .family.family_request import check_family
 from .joint.joining import check_joint
 from .surviving import check_survival
 
@@ -14,6 +15,8 @@ def check_request(request: PlanRequest) -> None:
     Raises:
         InputError: It names both, and what to do.
     """
+    if request.family is not None:
+        check_family(request)
     check_carried(request)
     check_survival(request)
     if request.wishes.joint:

@@ -148,7 +148,7 @@ def polished(partial: PartialPlan, clock: Stopwatch) -> PartialPlan:
         best, stage = cheapest(tuple(zip(stages, costs, strict=True)))
         partial, moved = replace(ringed[best], camera_stage=stage), every[best][1]
         _say_baselines(moved, clock)
-        if partial.request.ring_axis != "auto":
+        if partial.request.ring_axis != "auto" or partial.request.family is not None:
             return partial
         others = other_axes(
             partial.scene,

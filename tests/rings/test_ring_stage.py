@@ -192,7 +192,7 @@ def test_the_best_pitch_is_that_of_a_loop_over_pairs(bench):
     scene, projector, cameras = bench
     rows = lit_samples(scene, [projector], scene.target_samples(Draw(300, 80)))
     views = [
-        measurability.view(c, rows.target, scene.requirements.camera, scene.visibility)
+        measurability.view(c, rows.target, scene.requirements.camera, scene.occlusion)
         for c in cameras
     ]
     both = best_pitch(scene, [projector], views, rows)[:, 0]

@@ -202,7 +202,7 @@ def test_a_body_in_the_beam_casts_a_rectangle(scene, light):
         lamp,
         target,
         scene.requirements.projector,
-        scene.visibility,
+        scene.occlusion,
         bodies=among.bodies,
     )
     assert np.array_equal(single, expected)
@@ -238,7 +238,7 @@ def test_a_body_before_a_camera_hides_the_same_rectangle_but_never_its_own(scene
     among = scene.among([blind, eye])
     limits = scene.requirements.camera
     stage = measurability.view(
-        blind, target, limits, scene.visibility, among.bodies
+        blind, target, limits, scene.occlusion, among.bodies
     ).first_violated
     assert np.array_equal(
         stage, np.where(dark, camera_limits.BLOCKED, camera_limits.SEEN)

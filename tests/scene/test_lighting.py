@@ -16,6 +16,7 @@ from planning.model.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 from planning.scene import lighting
 from planning.scene.limits.projector_limits import CAUSES, LIT
+from planning.scene.occlusion import Occlusion
 from planning.scene.samples import Target
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -46,7 +47,8 @@ def target_on(mesh, n=4000, steep=(0.0, 0.0, 0.0), seed=1):
 
 
 def stages(projector, mesh, target, limits=LIMITS):
-    return lighting.first_failure(projector, target, limits, Visibility(mesh))
+    seen = Occlusion((Visibility(mesh),))
+    return lighting.first_failure(projector, target, limits, seen)
 
 
 def cause(projector, mesh, target, limits=LIMITS):

@@ -46,7 +46,7 @@ def test_candidates_together_light_what_each_lights_alone(light):
     rows = scene.target_samples(Draw(1500, 7))
     limits = required.projector
     alone = [
-        lighting.first_failure(one, rows, limits, scene.visibility) for one in offered
+        lighting.first_failure(one, rows, limits, scene.occlusion) for one in offered
     ]
     together = lit_stages(scene, offered, rows)
     np.testing.assert_array_equal(together, np.column_stack(alone))

@@ -19,6 +19,7 @@ from .coverage_records import (
     RobustRecord,
 )
 from .device_records import BaselineRow, CameraRecord, ProjectorRecord
+from .family_records import AlignmentRecord, FamilyRecord
 from .input_records import (
     EvaluationRecord,
     MeshRecord,
@@ -65,12 +66,24 @@ class CostRecord(Part):
 
 
 class MemberRecord(Part):
-    """What the plan does for one of its meshes."""
+    """What the plan does for one of its meshes.
+
+    Attributes:
+        mesh: Index in `meshes`.
+        name: Of a member of a family; likewise all below.
+        path: Its own plan, beside this one.
+        digest: Of that plan (`RigPlan.digest`).
+        alignment: Where it stands.
+    """
 
     mesh: int
     coverage: Coverage
     regions: tuple[int, ...]
     reconstruction: ReconstructionRecord | None = None
+    name: str = ""
+    path: str = ""
+    digest: str = ""
+    alignment: AlignmentRecord | None = None
 
 
 class PlanDocument(Part):
@@ -106,6 +119,7 @@ class PlanDocument(Part):
     robust: RobustRecord | None = None
     survival: SurvivalRecord | None = None
     joint: JointRecord | None = None
+    family: FamilyRecord | None = None
     stations: StationsRecord | None = None
     camera_groups: tuple[tuple[str, ...], ...] = ()
     assumed: tuple[str, ...] = ()

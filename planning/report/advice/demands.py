@@ -88,7 +88,7 @@ def demands(
     hopeful = (failed.sum(axis=0) == 1) & np.isfinite(asks).any(axis=0)
     near = np.flatnonzero(hopeful | (furthest >= measurability.OCCLUDED))
     between = measurability.first_between(
-        camera, target.take(near), scene.visibility, scene.bodies
+        camera, target.take(near), scene.occlusion, scene.bodies
     )
     furthest[near] = np.minimum(furthest[near], between)
     near = near[(between == SEEN) & (hopeful | seen)[near]]

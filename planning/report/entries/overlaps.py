@@ -95,7 +95,7 @@ def light_falls(
         replace(pattern_of(projector).with_border(), device=anywhere),
         plain,
         _ANY_LIGHT,
-        scene.visibility,
+        scene.occlusion,
         bodies=scene.bodies,
     )
     return stages == LIT

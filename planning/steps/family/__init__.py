@@ -1,0 +1,1 @@
+"""One rig for several meshes."""

@@ -1,0 +1,128 @@
+"""One rig that serves every member of a family, or the share of them that is asked."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planning.cameras.camera_cover import candidate_cover
+from planning.model.document.family_records import FamilyRecord
+from planning.model.plan import RigPlan
+from planning.model.progress import Stopwatch
+from planning.model.words import count_words
+from planning.projectors.projector_stage import ProjectorStage
+from planning.report.assemble import write_plan
+from planning.report.partial_plan import PartialPlan, PlanRequest
+from planning.rig.devices.lens_fit import check_fields
+from planning.steps.best_kept import Search
+from planning.steps.stages import (
+    first_projectors,
+    one_device_more,
+    placed,
+    polished,
+    with_free_axes,
+)
+
+from .family_plan import family_plan
+from .family_proofs import FamilyProofs
+from .left_out import costly_members
+from .member_stages import member_partial
+from .prepared_family import PreparedFamily, prepared_family
+
+
+@dataclass(frozen=True, eq=False)
+class FamilyPartial:
+    """The rig of a family as far as it came, with what is proved of it so far."""
+
+    family: PreparedFamily
+    partial: PartialPlan
+    proofs: FamilyProofs | None = None
+    truncated: bool = False
+
+
+def family_sought(request: PlanRequest, clock: Stopwatch) -> Search[FamilyPartial]:
+    """Devices and rings for all members that are served; proofs; one device more."""
+    check_fields(request.rig.fits(request.mesh))
+    family = prepared_family(request, clock)
+    family, stage = _projectors(family, clock)
+    partial = placed(family.ready, stage, clock)
+    fewer = _without_costly_views(family, partial)
+    if fewer.served != family.served:
+        _say_left_out(fewer, clock)
+        family = fewer
+        stage = first_projectors(family.ready, clock)
+        partial = placed(family.ready, stage, clock)
+    larger: PartialPlan | None = partial
+    while larger is not None:
+        yield FamilyPartial(family, larger), False
+        partial = polished(larger, clock)
+        yield FamilyPartial(family, partial), False
+        proofs = FamilyProofs.over_candidates(family, partial)
+        proofs = proofs.over_poses(family, clock)
+        plan = yield FamilyPartial(family, partial, proofs), True
+        assert plan is not None
+        larger = _larger(family, partial, plan, clock)
+
+
+def write_family(made: FamilyPartial, clock: Stopwatch) -> RigPlan:
+    """Write every member's plan, each from fresh samples of its own, and the whole."""
+    family, partial = made.family, replace(made.partial, truncated=made.truncated)
+    proofs = made.proofs or FamilyProofs.over_candidates(family, partial)
+    plans = tuple(
+        write_plan(member_partial(ready, partial, needs), clock)
+        for ready, needs in zip(family.members, proofs.needs, strict=True)
+    )
+    record: FamilyRecord = proofs.record(family, partial)
+    return family_plan(plans, family.asked.names, family.asked.alignments, record)
+
+
+def _projectors(
+    family: PreparedFamily, clock: Stopwatch
+) -> tuple[PreparedFamily, ProjectorStage]:
+    """The fewest projectors, without members that cost some and may be left out."""
+    stage = first_projectors(family.ready, clock)
+    allowed = len(family.served) - family.asked.n_asked
+    if not allowed:
+        return family, stage
+    cover = stage.candidates.cover
+    costly = costly_members(cover, stage.certificate.needed.count, allowed)
+    if not costly:
+        return family, stage
+    family = family.without(sorted(costly))
+    _say_left_out(family, clock)
+    return family, first_projectors(family.ready, clock)
+
+
+def _without_costly_views(
+    family: PreparedFamily, partial: PartialPlan
+) -> PreparedFamily:
+    """The family without members that cost cameras, as far as any may be left out."""
+    allowed = len(family.served) - family.asked.n_asked
+    if not allowed:
+        return family
+    stage = partial.camera_stage
+    cover = candidate_cover(
+        partial.scene, stage.cover.measured, stage.cover.samples, stage.reference
+    )
+    needed = stage.certificate.needed.count
+    return family.without(sorted(costly_members(cover, needed, allowed)))
+
+
+def _say_left_out(family: PreparedFamily, clock: Stopwatch) -> None:
+    left = np.setdiff1d(np.arange(len(family.members)), family.served)
+    names = ", ".join(family.asked.names[i] for i in left)
+    clock.say(
+        f"  {count_words(len(left), 'member')} left out, which cost more: {names}"
+    )
+
+
+def _larger(
+    family: PreparedFamily, partial: PartialPlan, plan: RigPlan, clock: Stopwatch
+) -> PartialPlan | None:
+    """The rig with other axes or one device more, where any member falls short."""
+    for member in family.served:
+        own = plan.members[member]
+        larger = with_free_axes(partial, own, clock)
+        larger = larger or one_device_more(partial, own, clock)
+        if larger is not None:
+            return larger
+    return None
