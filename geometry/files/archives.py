@@ -109,3 +109,14 @@ def _at_most(pieces: Iterable[bytes]) -> bytes:
         if total > _MAX_BYTES:
             raise OSError(f"it unpacks to more than {_MAX_BYTES >> 30} GiB")
     return b"".join(held)
+
+
+def is_mesh_name(name: str) -> bool:
+    """Return whether a file is read as a mesh, by its name; what it holds may not be.
+
+    A .zip is, though it may hold none.
+    """
+    path = PurePosixPath(name.lower())
+    if path.suffix in (".gz", ".bz2"):
+        path = path.with_suffix("")
+    return path.suffix.lstrip(".") in (*SUPPORTED, "zip")

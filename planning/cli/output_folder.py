@@ -22,7 +22,7 @@ from .console import stop_signals
 
 # What a run writes, and what of an older plan doesn't stay beside a new one.
 _CLOUDS = ("cloud.ply", "deviation.ply")
-OWNED = ("plan.json", "surface.npz", "rig.png", PAGE, "patterns", *_CLOUDS)
+OWNED = ("plan.json", "surface.npz", "members", "rig.png", PAGE, "patterns", *_CLOUDS)
 # `renameat2` and `renamex_np` exchange two entries under these flags.
 _EXCHANGE, _SWAP, _HERE = 2, 2, -100
 # What is younger may be what another run is writing just now [s].
@@ -40,14 +40,16 @@ def exchanged(folder: Path) -> Generator[Path]:
         folder: Where the plan is to be; it needn't exist.
 
     Raises:
-        OSError: If nothing can be written, or `patterns` is another maker's.
+        OSError: If nothing can be written, or `patterns` or `members` is another
+            maker's.
     """
     folder = folder.resolve()
-    if (folder / "patterns").exists() and not _is_ours(folder / "patterns"):
-        raise FileExistsError(
-            f"{folder / 'patterns'} isn't of a plan; move it, or choose another folder "
-            f"with -o"
-        )
+    for name in ("patterns", "members"):
+        if (folder / name).exists() and not _is_ours(folder / name):
+            raise FileExistsError(
+                f"{folder / name} isn't of a plan; move it, or choose another folder "
+                f"with -o"
+            )
     movable = not Path.cwd().is_relative_to(folder) and not folder.is_mount()
     beside = folder.parent if movable else folder
     if movable:
@@ -124,6 +126,8 @@ def _is_ours(entry: Path) -> bool:
         return is_page(entry)
     if entry.name == "patterns":
         return is_patterns(entry)
+    if entry.name == "members":
+        return all((member / "plan.json").is_file() for member in entry.iterdir())
     return entry.name in OWNED
 
 

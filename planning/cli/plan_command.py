@@ -9,6 +9,7 @@ import click
 from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
 from geometry.parallel import n_threads
+from planning.model.errors import InputError
 from planning.model.plan import InterruptedPlanError, RequirementError
 from planning.model.progress import Report, Stopwatch
 from planning.pipeline import plan_rig
@@ -44,6 +45,8 @@ _ASKED = (
     "survive",
     "joint",
     "pattern",
+    "align",
+    "family_quantile",
     "seed",
     "prove",
     "cameras_by",
@@ -58,8 +61,10 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
     limit = None if limit is None else _OURS * limit
     clock = Stopwatch(time_limit=limit, begin=begin)
     path = Path(options["ranges"] or options["meshes"][0])
+    several = len(options["meshes"]) > 1
     evaluates = options["max_projectors"] is None and options["max_heads"] is None
     result = "evaluation" if evaluates else "plan"
+    result = f"family-{result}" if several else result
     folder = options["output"] or Path(f"{path.name.split('.')[0]}-{result}")
     threads = options["threads"] or n_threads()
     check, interrupted = not options["no_check"], False
@@ -68,7 +73,11 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
         with clock.ticking():
             rig = load_rig(options["rig_name"], light=options["light"])
             fixed = _fixed(options["fixed"], rig)
-            surface, interest = _read(path, options, rig, report)
+            surface, interest = (
+                (_family(options, rig, report), None)
+                if several
+                else _read(path, options, rig, report)
+            )
         try:
             plan = plan_rig(
                 surface,
@@ -126,6 +135,22 @@ def _read(
     for line in (*size_lines(mesh), *optics_lines(rig, mesh), *chosen):
         report(line)
     return mesh, interest
+
+
+def _family(options: Mapping[str, Any], rig: Rig, report: Report) -> list[TriangleMesh]:
+    """Read the meshes of a family, and say what each is."""
+    for name in ("select", "weight"):
+        if options[name] is not None:
+            raise InputError(f"--{name} is of one mesh: leave it out, or plan one")
+    meshes: list[TriangleMesh] = []
+    for path in options["meshes"]:
+        report(f"reading {path}")
+        meshes.append(load_mesh(path, unit=options["unit"]))
+        for line in size_lines(meshes[-1]):
+            report(line)
+    for line in optics_lines(rig, TriangleMesh.joined(meshes)):
+        report(line)
+    return meshes
 
 
 def _interest(

@@ -58,17 +58,23 @@ class SavedPlans:
 
     def write_page(self, plan: RigPlan, clock: Stopwatch, threads: int) -> None:
         """Write `report.html` beside a plan that stands, where there is time for it."""
-        path = self._folder / PAGE
-        if path.exists() and not is_page(path):
-            self._report(f"{path} isn't of a plan and stays; `plan report -o` writes")
-            return
         self._report("report")
-        try:
-            with clock.ticking():
-                error_m = self._errors.get(plan.digest)
-                write_page(plan, path, threads=threads, error_m=error_m)
-        except TIME_IS_UP:
-            self._report(f"no time for {path}: `plan report {self._folder}` writes it")
+        pages = {self._folder / PAGE: plan}
+        for record, member in zip(plan.document.members, plan.members, strict=False):
+            pages[(self._folder / record.path).with_name(PAGE)] = member
+        for path, shown in pages.items():
+            if path.exists() and not is_page(path):
+                self._report(
+                    f"{path} isn't of a plan and stays; `plan report -o` writes"
+                )
+                continue
+            try:
+                with clock.ticking():
+                    error_m = self._errors.get(shown.digest)
+                    write_page(shown, path, threads=threads, error_m=error_m)
+            except TIME_IS_UP:
+                folder = path.parent
+                self._report(f"no time for {path}: `plan report {folder}` writes it")
 
     def finish(self, plan: RigPlan, clock: Stopwatch) -> RigPlan:
         """Save how a run ended, and return the plan that stands in the folder.

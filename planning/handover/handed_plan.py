@@ -34,7 +34,7 @@ class HandedPlan(RigPlan):
     @classmethod
     def of(cls, plan: RigPlan) -> Self:
         """Return a plan of the planner in this form."""
-        return cls(plan.document, plan.surface)
+        return cls(plan.document, plan.surface, tuple(map(cls.of, plan.members)))
 
     @property
     def missed(self) -> tuple[str, ...]:

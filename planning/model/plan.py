@@ -44,6 +44,11 @@ class RigPlan:
     members: tuple["RigPlan", ...] = ()
 
     @property
+    def of_member(self) -> bool:
+        """Whether this is the plan of one member, whose rig is a family's."""
+        return not self.members and any(record.name for record in self.document.members)
+
+    @property
     def served(self) -> tuple[tuple[str, "RigPlan"], ...]:
         """Name and plan of each member that the rig must serve; none: no family."""
         family = self.document.family

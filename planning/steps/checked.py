@@ -47,12 +47,6 @@ def axes_may_help(plan: RigPlan, partial: PartialPlan) -> bool:
 
 def missed_by(plan: RigPlan, *, check: bool) -> tuple[str, ...]:
     """Return what of the requirements a plan misses, and the check if it was wanted."""
-    if plan.members:
-        return tuple(
-            f"{name}: {one}"
-            for name, member in plan.served
-            for one in missed_by(member, check=check)
-        )
     missed = shortfalls(plan)
     if check and plan.document.reconstruction is None:
         missed += ("the check wasn't made: the time limit came first",)

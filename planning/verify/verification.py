@@ -17,6 +17,7 @@ from planning.verify.audit.audit import Audit, audit_plan
 from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.coverage.prediction import possible_at_floors
 from planning.verify.audit.figure_claims import compare_figures, contradictions
+from planning.verify.family import audit_family
 from planning.verify.reconstruction.check.accuracy import Expected
 from planning.verify.reconstruction.check.comparison import PredictedSamples, compare
 from planning.verify.reconstruction.check.interreflection import (
@@ -47,12 +48,15 @@ class Verification:
         audit: The geometric audit.
         reconstruction: The simulated one; None if it wasn't asked for.
         missed: Limits of the check that aren't kept, as the plan records itself.
+        members: Of a family each member's name, and what was found of it; the audit and
+            the reconstruction are then the worst member's.
     """
 
     failures: tuple[str, ...]
     audit: Audit
     reconstruction: Reconstruction | None
     missed: tuple[str, ...] = ()
+    members: tuple[tuple[str, "Verification"], ...] = ()
 
     @property
     def passed(self) -> bool:
@@ -72,6 +76,7 @@ class Verification:
     def to_document(self) -> dict[str, Any]:
         """Return plain JSON values."""
         pixels = self.reconstruction
+        named = {name: member.to_document() for name, member in self.members}
         return {
             "passed": self.passed,
             "failures": list(self.failures),
@@ -79,12 +84,19 @@ class Verification:
             "coverage": self.coverage,
             "samples": len(self.audit.case.samples),
             "reconstruction": None if pixels is None else pixels.to_document(),
+            **({"members": named} if named else {}),
         }
 
     def summary(self) -> str:
         """Return the verdict for a person, in a few lines."""
         alone = self.audit.case.plan.cameras_alone
         lines = [
+            f"{name}: {'verified' if member.passed else 'NOT verified'}"
+            for name, member in self.members
+        ]
+        if lines:
+            lines.append("the worst member:")
+        lines += [
             _areas_line(name, self.coverage[name], alone=alone)
             for name in ("target", "surface")
         ]
@@ -141,6 +153,21 @@ def verify_plan(
         if progress is not None:
             progress(line)
 
+    if plan.document.family is not None:
+        if mesh is not None or truth is not None:
+            raise InputError(
+                "a family is verified as its members were planned: compare a mesh, or "
+                "what really stands there, with the plan of one member (members/NAME)"
+            )
+        return _verify_family(
+            plan,
+            say,
+            check_pixels=check_pixels,
+            physics=physics,
+            photometry=photometry,
+            seed=seed,
+            threads=threads,
+        )
     if truth is not None and truth.cameras_alone != plan.cameras_alone:
         raise InputError(
             "what stands there and the plan must have projectors both, or neither; "
@@ -169,6 +196,32 @@ def verify_plan(
     if recorded is not None and not recorded.passed and not false:
         return Verification(tuple(failures), audit, pixels, pixels.failures)
     return Verification((*failures, *pixels.failures, *false), audit, pixels)
+
+
+def _verify_family(
+    plan: RigPlan,
+    say: Callable[[str], None],
+    **how: Any,  # noqa: ANN401
+) -> Verification:
+    """Verify every member by itself, then what is said of them together."""
+    family, found = plan.document.family, list[tuple[str, Verification]]()
+    assert family is not None
+    for record, member in zip(plan.document.members, plan.members, strict=True):
+        say(f"member {record.name}")
+        found.append((record.name, verify_plan(member, progress=say, **how)))
+    false = audit_family(plan)
+    # Of one that needn't be served what it misses is no requirement; a lie is a lie.
+    served = [one for m, one in enumerate(found) if m not in family.left_out]
+    worst = found[min(family.worst, len(found) - 1)][1]
+    return Verification(
+        (*false, *(f"{name}: {line}" for name, one in found for line in one.failures)),
+        replace(
+            worst.audit,
+            unmet=tuple(f"{n}: {line}" for n, one in served for line in one.unmet),
+        ),
+        worst.reconstruction,
+        members=tuple(found),
+    )
 
 
 def compare_meshes(mesh: TriangleMesh, surface: TriangleMesh) -> list[str]:

@@ -13,6 +13,8 @@ from .plan_declared import GroupedCommand, check_options, rig_command
 # What a rig that stands doesn't take: nothing is sought, and the mesh is known. As if
 # they weren't given; `--poses` is what `--fixed` is to a plan.
 _OF_PLANS = {
+    "align": "given",
+    "family_quantile": 1.0,
     "ranges": None,
     "max_projectors": None,
     "max_heads": None,

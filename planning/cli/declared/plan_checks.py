@@ -1,9 +1,13 @@
 """Which options of `plan` exclude each other."""
 
+import glob
 import os
 from typing import Any
 
 import click
+
+from geometry.files.archives import is_mesh_name
+from geometry.files.formats import SUPPORTED
 
 
 def check_options(options: dict[str, Any]) -> None:
@@ -34,13 +38,41 @@ def _check_source(options: dict[str, Any]) -> None:
     if ranges is not None:
         _check_ranges(options)
         return
-    if not meshes[0]:
+    if not all(meshes):
         raise click.UsageError("--mesh '' names no file")
-    # os.path answers for names that the system refuses; Path raises.
-    if len(meshes) > 1 or os.path.isdir(meshes[0]):
+    options["meshes"] = meshes = tuple(one for given in meshes for one in _files(given))
+    if len(meshes) == 1:
+        return
+    if options["size_mm"] is not None:
         raise click.UsageError(
-            "several meshes on one rig aren't built yet: give one file"
+            f"--size-mm with {len(meshes)} meshes would make all as large: give --unit"
         )
+    if options.get("poses"):
+        raise click.UsageError(
+            f"an evaluation is of one mesh, and there are {len(meshes)}: give one"
+        )
+
+
+def _files(given: str) -> list[str]:
+    """Return the meshes of a folder, or those that a pattern matches, or the file.
+
+    Raises:
+        click.UsageError: If a folder or a pattern holds none.
+    """
+    # os.path answers for names that the system refuses; Path raises.
+    if os.path.isdir(given):
+        names = sorted(os.listdir(given))
+        found = [os.path.join(given, name) for name in names if is_mesh_name(name)]
+    elif os.path.exists(given) or not glob.has_magic(given):
+        return [given]
+    else:
+        found = sorted(one for one in glob.glob(given) if is_mesh_name(one))
+    if not found:
+        raise click.UsageError(
+            f"--mesh {given}: no mesh there; files must end in .{', .'.join(SUPPORTED)}"
+            f", perhaps with .gz, .bz2 or .zip"
+        )
+    return found
 
 
 def check_projectors(options: dict[str, Any]) -> None:

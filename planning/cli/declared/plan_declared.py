@@ -20,7 +20,7 @@ from .survival_options import survival_options
 # What `plan --help` puts together; an option of none of these is told last.
 _GROUPS = {
     "What is measured": (
-        *("meshes", "ranges", "unit", "size_mm", "up"),
+        *("meshes", "align", "family_quantile", "ranges", "unit", "size_mm", "up"),
         *("target", "select", "weight"),
     ),
     "With what, and where": (
@@ -80,7 +80,22 @@ class GroupedCommand(click.Command):
     multiple=True,
     type=click.Path(),
     metavar="FILE",
-    help="Surface to measure: OBJ, PLY, STL, OFF, GLB, 3MF; .gz, .bz2, .zip too.",
+    help="Surface to measure: OBJ, PLY, STL, OFF, GLB, 3MF; .gz, .bz2, .zip too. "
+    "Several times, a folder or a pattern: one rig for all of them.",
+)
+@click.option(
+    "--align",
+    type=click.Choice(["given", "axes", "icp"]),
+    default="given",
+    help="Lay several meshes over the first: as they are, by principal axes, or by ICP "
+    "[default: given].",
+)
+@click.option(
+    "--family-quantile",
+    type=Share(),
+    metavar="F",
+    default="1.0",
+    help="Share of several meshes that the rig must serve [default: 1].",
 )
 @click.option(
     "--ranges",

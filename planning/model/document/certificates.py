@@ -115,6 +115,7 @@ class Certificate(Part):
         bounds_leave_out: What the bounds know nothing of.
         excluded_pairs: Pairs of candidate and sample by the first limit that they fail.
         n_regions: Regions of the target.
+        alone: Candidates that a member of a family takes for itself; None: no family.
     """
 
     count: Count
@@ -135,6 +136,7 @@ class Certificate(Part):
     n_regions: Count = 0
     floors: Count = 0
     routes: RouteCounts | None = None
+    alone: Count | None = None
 
 
 class Certificates(Part):

@@ -51,6 +51,13 @@ def table(
     return element("div", scrolled + below, class_="entry")
 
 
+def linked(markup: str, heading: str, address: str) -> str:
+    """Return a table with the heading of a row as a link."""
+    plain = element("th", escape(heading), scope="row")
+    link = element("a", escape(heading), href=address)
+    return markup.replace(plain, element("th", link, scope="row"), 1)
+
+
 def _row(cells: Sequence[Cell]) -> str:
     first, *others = (("" if cell is None else str(cell)) for cell in cells)
     return element(

@@ -18,6 +18,7 @@ from planning.report.summary.summary import summary
 from .claim_tables import claim_tables
 from .device_tables import device_tables
 from .facts import as_script, viewer_facts
+from .family_table import family_table
 from .per_face import centroids, per_face
 from .verdict import verdict
 from .wall_sheet import wall_sheet
@@ -90,7 +91,7 @@ def page_of(plan: RigPlan, *, threads: int, error_m: Array | None = None) -> str
         style=style,
         verdict=verdict(plan),
         remark=escape(_NO_CLOUD) if error_m is None else "",
-        tables="".join((*device_tables(plan), *claim_tables(plan))),
+        tables="".join((family_table(plan), *device_tables(plan), *claim_tables(plan))),
         summary=escape(summary(plan, (), shortfalls(plan))),
         wall=wall_sheet(plan),
         footer=escape(footer),

@@ -20,6 +20,7 @@ from planning.report.tolerance.survival_lines import counted_words, losses_words
 from .cause_words import causes_line
 from .check_lines import error_words, unchecked
 from .device_lines import axis_name, devices_words, models_line, standing, used_up
+from .family_lines import family_bounds, members_words
 from .proof_lines import target_words
 from .region_lines import worst_region
 from .shortfall import Shortfall, missing
@@ -79,7 +80,7 @@ def _head(plan: RigPlan, short: Sequence[Shortfall]) -> Iterator[_Block]:
     if document.stations is not None:
         devices = f"{title_words(document)} ({devices})"
     state = f", {_state(plan)}" if _state(plan) else ""
-    name = Path(document.meshes[0].path or "the mesh").name
+    name = members_words(plan) or Path(document.meshes[0].path or "the mesh").name
     if short:
         figures = [one.figure for one in short[:2]]
         more = f"; and {len(short) - 2} more" if len(short) > 2 else ""
@@ -91,6 +92,9 @@ def _head(plan: RigPlan, short: Sequence[Shortfall]) -> Iterator[_Block]:
         yield "OK", f"{devices} measure {name} as asked{as_built}{state}", 2
     x, y, z = np.diff(plan.surface.mesh.bounds, axis=0)[0] * 1e3
     up = axis_name(plan.requirements.workspace.up)
+    if plan.members:
+        worst = document.members[document.family.worst].name if document.family else ""
+        yield "", f"below: {worst}, the member of which least is covered", 1
     yield (
         "",
         f"{x:.0f} x {y:.0f} x {z:.0f} mm, up {up}, rig {rig.name}; target: "
@@ -171,6 +175,10 @@ def _measured(plan: RigPlan) -> Iterator[_Block]:
 def _fewest(plan: RigPlan) -> Iterator[_Block]:
     """Say what is known of fewer devices, over the candidates and over every pose."""
     if plan.document.evaluation is not None:
+        return
+    if plan.members:
+        for label, words in zip(("FEWEST", ""), family_bounds(plan), strict=True):
+            yield label, words, 2
         return
     if fewest := fewest_words(plan):
         yield "FEWEST", fewest, 2

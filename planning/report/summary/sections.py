@@ -11,6 +11,7 @@ from planning.report.tolerance.survival_lines import survival_lines
 from .check_lines import check_lines, cost_lines
 from .coverage_lines import coverage_lines, marginal_lines, schedule_lines
 from .device_lines import device_lines, gap_lines, mount_lines
+from .family_lines import family_lines
 from .light_lines import light_lines
 from .proof_lines import proof_lines
 from .region_lines import region_table
@@ -56,6 +57,11 @@ SECTIONS = (
         "stations",
         "heads, stations or steps with their devices, and what trades against what.",
         station_lines,
+    ),
+    Section(
+        "family",
+        "members that the rig measures one at a time, and what bounds their rig.",
+        family_lines,
     ),
     Section(
         "coverage",

@@ -57,7 +57,13 @@ def shortfalls(plan: RigPlan) -> tuple[str, ...]:
 
 
 def missing(plan: RigPlan) -> Iterator[Shortfall]:
-    """Yield the requirements that a plan misses."""
+    """Yield the requirements that a plan misses, of a family member by member."""
+    for name, member in plan.served:
+        for one in missing(member):
+            named = (f"{name}: {text}" for text in (one.figure, one.missed))
+            yield Shortfall(*named, one.helps, one.between)
+    if plan.members:
+        return
     every = list(_missing(plan))
     for one in every:
         # Where several are missed, what accepts one doesn't accept the plan.

@@ -27,7 +27,6 @@ from planning.scene.draws import DRAWS
 from .member_stages import MemberNeeds, member_needs, outsider_needs
 from .prepared_family import PreparedFamily
 
-
 _S = TypeVar("_S", ProjectorStage, CameraStage)
 
 

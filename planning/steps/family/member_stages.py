@@ -207,4 +207,5 @@ def _of_count(proof: Certificate, count: int) -> Certificate:
         status="optimal" if least >= count else "feasible",
         greedy_count=max(count, proof.greedy_count),
         needed=NeededCount(count=count, lower_bound=least),
+        alone=proof.needed.count,
     )

@@ -25,14 +25,33 @@ POSITION_M = 2e-5
 SAME_POSE = 1e-9
 
 
+def audit_ball(space: Workspace, mesh: TriangleMesh, findings: AuditFindings) -> None:
+    """Check that the workspace is about the smallest ball that holds a surface."""
+    slack = _ROUNDING * max(1.0, float(np.abs(mesh.bounds).max()))
+    whose = "the centre of the smallest ball that holds the surface"
+    findings.same("centre", list(space.centre), mesh.centre, whose, slack)
+    findings.numbers(space, {"object_radius_m": mesh.radius}, slack, "m")
+
+
+def _audit_held(space: Workspace, mesh: TriangleMesh, findings: AuditFindings) -> None:
+    """Check that the ball of all members holds the main bodies of this one."""
+    held = mesh.vertices[np.unique(mesh.faces[mesh.main])]
+    reach = float(np.linalg.norm(held - np.array(space.centre), axis=1).max())
+    findings.holds(
+        reach <= space.object_radius_m + POSITION_M,
+        "object_radius_m",
+        f"{space.object_radius_m:.6g} m, but the surface reaches out to {reach:.6g} m",
+    )
+
+
 def audit_workspace(case: AuditCase, findings: AuditFindings) -> None:
     """Check the workspace against the surface, and the reference poses against it."""
     space, surface = case.plan.requirements.workspace, case.plan.surface
     below = findings.at(_KEY)
-    slack = _ROUNDING * max(1.0, float(np.abs(surface.mesh.bounds).max()))
-    whose = "the centre of the smallest ball that holds the surface"
-    below.same("centre", list(space.centre), surface.mesh.centre, whose, slack)
-    below.numbers(space, {"object_radius_m": surface.mesh.radius}, slack, "m")
+    if case.plan.of_member:
+        _audit_held(space, surface.mesh, below)
+    else:
+        audit_ball(space, surface.mesh, below)
     _audit_values(space, below)
     for kind in case.kinds:
         low, high = kind.shell

@@ -27,11 +27,9 @@ def audit_ring_axes(case: AuditCase, findings: AuditFindings) -> None:
         "taken",
         f"{axes.taken!r} is claimed where {axes.asked!r} was asked",
     )
-    if axes.taken == "centred":
-        for p, record in enumerate(case.plan.document.projectors):
-            kept = record.rings is not None and record.rings.spacing == "kept"
-            if not kept:
-                _audit_centred(case, p, findings.at(record.id))
+    # A member's light is a part of what the axis is in the middle of.
+    if axes.taken == "centred" and not case.plan.of_member:
+        audit_centred((case,), findings)
     if axes.other is None:
         return
     others, below = axes.other.projectors, findings.at("other")
@@ -54,19 +52,29 @@ def audit_ring_axes(case: AuditCase, findings: AuditFindings) -> None:
     case.estimator.audit("measured_m2", claimed, measured, below, part="target")
 
 
-def _audit_centred(case: AuditCase, p: int, findings: AuditFindings) -> None:
-    """Check that hardly a narrower ring about another axis holds what is lit."""
-    projector, points = case.projectors[p], case.samples.points[case.actual.lit_by[p]]
-    if len(points) == 0:
-        return
-    reach = float(projector.ring_coordinate(points).max())
-    least = projector.light.narrowest_ring(points)
-    findings.holds(
-        reach <= (1.0 + _WIDER) * least,
-        "world_from_ring",
-        f"is claimed to be centred, but what is lit reaches out to a ring of "
-        f"{reach:.5g}, and about another axis to one of {least:.5g}",
-    )
+def audit_centred(cases: Sequence[AuditCase], findings: AuditFindings) -> None:
+    """Check that hardly narrower rings about other axes hold what is lit in all cases.
+
+    The cases are of the same projectors before several surfaces. One that keeps its
+    rings is left out.
+    """
+    for p, record in enumerate(cases[0].plan.document.projectors):
+        if record.rings is not None and record.rings.spacing == "kept":
+            continue
+        projector = cases[0].projectors[p]
+        points = np.concatenate(
+            [case.samples.points[case.actual.lit_by[p]] for case in cases]
+        )
+        if len(points) == 0:
+            continue
+        reach = float(projector.ring_coordinate(points).max())
+        least = projector.light.narrowest_ring(points)
+        findings.at(record.id).holds(
+            reach <= (1.0 + _WIDER) * least,
+            "world_from_ring",
+            f"is claimed to be centred, but what is lit reaches out to a ring of "
+            f"{reach:.5g}, and about another axis to one of {least:.5g}",
+        )
 
 
 def _measured(case: AuditCase, projectors: Sequence[AuditProjector]) -> Mask:

@@ -1,0 +1,33 @@
+"""The members of a family in a table, each with a link to its own page."""
+
+from html import escape
+from pathlib import PurePosixPath
+
+from planning.model.plan import RigPlan
+from planning.report.summary.family_lines import (
+    family_bounds,
+    family_heads,
+    family_rows,
+)
+
+from .markup import element, linked, paragraphs, table
+
+_PAGE = "report.html"
+
+
+def family_table(plan: RigPlan) -> str:
+    """Return the table and what bounds the rig; nothing of a plan for one mesh."""
+    rows = list(family_rows(plan))
+    if not rows:
+        return ""
+    shown = next(row.cells[0] for row in rows if row.worst)
+    note = (
+        "Each member is measured alone. Lit and measured: of what can be. What follows "
+        f"is of {shown.removesuffix(' (worst)')}."
+    )
+    whole = table("Members", family_heads(), [row.cells for row in rows], note)
+    for row in rows:
+        page = str(PurePosixPath(row.path).with_name(_PAGE))
+        whole = linked(whole, row.cells[0], page)
+    bounds = paragraphs(family_bounds(plan))
+    return element("h2", escape("Family")) + whole + bounds
