@@ -1,10 +1,15 @@
 """A family's plan: its members are verified one by one, then what is said of all."""
 
+from collections.abc import Sequence
 from typing import Any
 
+from geometry.mesh.mesh import TriangleMesh
 from planning.model.document.family_records import FamilyCount
 from planning.model.plan import RigPlan
+from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
+from planning.verify.audit.devices.workspace_claims import audit_ball
+from planning.verify.audit.rings.axis_claims import audit_centred
 
 # Of the document of a member these are its own, and differ from the family's.
 _OWN = frozenset(
@@ -15,12 +20,13 @@ _SHARED = ("seed", "command", "truncated", "rig")
 _SLACK = 1e-9
 
 
-def audit_family(plan: RigPlan) -> tuple[str, ...]:
+def audit_family(plan: RigPlan, cases: Sequence[AuditCase]) -> tuple[str, ...]:
     """Return each false claim that a family's plan makes beyond those of its members.
 
     That all members stand before the same rig under the same requirements; that the
     plan tells their coverage and checks as they do, and is otherwise that of the worst
     one served; that enough are served; and what is said of the number of devices.
+    The cases are the members'.
     """
     family, findings = plan.document.family, AuditFindings()
     assert family is not None
@@ -39,6 +45,12 @@ def audit_family(plan: RigPlan) -> tuple[str, ...]:
         return findings.failures
     _audit_records(plan, findings)
     _audit_rig(plan, findings)
+    together = TriangleMesh.joined([member.surface.mesh for member in members])
+    space = plan.requirements.workspace
+    audit_ball(space, together, findings.at("requirements.workspace"))
+    axes = plan.document.ring_axes
+    if axes is not None and axes.taken == "centred":
+        audit_centred(cases, findings.at("ring_axes"))
     least = family.quantile * n * (1.0 - _SLACK)
     asked = family.n_asked >= least and n - len(left) >= family.n_asked
     findings.holds(

@@ -209,7 +209,7 @@ def _verify_family(
     for record, member in zip(plan.document.members, plan.members, strict=True):
         say(f"member {record.name}")
         found.append((record.name, verify_plan(member, progress=say, **how)))
-    false = audit_family(plan)
+    false = audit_family(plan, [one.audit.case for _, one in found])
     # Of one that needn't be served what it misses is no requirement; a lie is a lie.
     served = [one for m, one in enumerate(found) if m not in family.left_out]
     worst = found[min(family.worst, len(found) - 1)][1]

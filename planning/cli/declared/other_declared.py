@@ -22,6 +22,7 @@ _SECTIONS = {
     "places": "Object, zones and devices in the axes of the mesh.",
     "stations": "Heads, their stations, or steps of a turntable, with their devices.",
     "cameras": "Of each camera mm per pixel, image filled, distances, angles.",
+    "family": "Members of a family, what each gets, and what bounds their rig.",
     "coverage": "Areas that are lit and measured, and what is left out.",
     "proofs": "What was proved of the numbers of devices.",
     "marginal": "What one device more or fewer would change.",

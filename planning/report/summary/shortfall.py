@@ -60,8 +60,8 @@ def missing(plan: RigPlan) -> Iterator[Shortfall]:
     """Yield the requirements that a plan misses, of a family member by member."""
     for name, member in plan.served:
         for one in missing(member):
-            named = (f"{name}: {text}" for text in (one.figure, one.missed))
-            yield Shortfall(*named, one.helps, one.between)
+            figure, missed = f"{name}: {one.figure}", f"{name}: {one.missed}"
+            yield replace(one, figure=figure, missed=missed)
     if plan.members:
         return
     every = list(_missing(plan))

@@ -23,6 +23,7 @@ def family_plan(
     Its claims are those of the served member of which the smallest share of what is
     asked is met.
     """
+    members = [_named(plan, name) for plan, name in zip(members, names, strict=True)]
     served = [m for m in range(len(members)) if m not in record.left_out]
     worst = min(served, key=lambda m: (met(members[m]), m))
     shown = members[worst]
@@ -50,6 +51,13 @@ def family_plan(
         family=record.changed(worst=worst),
     )
     return RigPlan(document, surface, tuple(members))
+
+
+def _named(plan: RigPlan, name: str) -> RigPlan:
+    """Return the plan of a member, which says that it is one."""
+    (record,) = plan.document.members
+    named = plan.document.changed(members=(record.changed(name=name),))
+    return RigPlan(named, plan.surface)
 
 
 def met(plan: RigPlan) -> float:

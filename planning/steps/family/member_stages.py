@@ -202,10 +202,16 @@ def _certificate(
 def _of_count(proof: Certificate, count: int) -> Certificate:
     """What a member's certificate is of as many devices as the family has."""
     least = proof.candidates.lower_bound
+    one_fewer = proof.one_fewer
+    if least >= count:
+        # Where so many are proved too few, they fall short by a sample at least.
+        short = proof.required_m2 * (1.0 - 1e-6)
+        one_fewer = OneFewer(upper_bound_m2=short)
     return proof.changed(
         count=count,
         status="optimal" if least >= count else "feasible",
         greedy_count=max(count, proof.greedy_count),
         needed=NeededCount(count=count, lower_bound=least),
+        one_fewer=one_fewer,
         alone=proof.needed.count,
     )

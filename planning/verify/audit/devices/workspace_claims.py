@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from geometry.arrays import Array
+from geometry.mesh.mesh import TriangleMesh
 from planning.model.plan import RigPlan
 from planning.model.requirements import Workspace
 from planning.verify.audit.audit_case import AuditCase, DeviceKind
