@@ -1,0 +1,297 @@
+"""One rig for several meshes: plans whose counts are known, and what may be said."""
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from support.factories import EXACT
+from support.plain_shapes import grid
+
+from geometry.mesh.mesh import TriangleMesh
+from planning import RigPlan, load_rig, plan_rig, verify_plan
+from planning.cli.main import commands
+from planning.model.errors import InputError, PlanFileError
+from planning.steps.family.family_plan import family_plan, met
+
+RIG = f"""
+base = "default"
+name = "few candidates"
+{EXACT}
+[placement]
+n_candidate_projectors = 60
+n_candidate_cameras = 60
+n_reference_projectors = 600
+n_reference_cameras = 400
+"""
+
+
+def plate(towards: int, away: float = 0.03) -> TriangleMesh:
+    """A plate that faces along +y or -y, and stands off the origin to that side."""
+    flat = grid(0.1, 0.1, divisions=(8, 8))
+    x, z, _ = flat.vertices.T
+    turned = np.column_stack([-towards * x, np.full(len(x), towards * away), z])
+    return TriangleMesh(turned, flat.faces)
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory):
+    path = tmp_path_factory.mktemp("rig") / "few.toml"
+    path.write_text(RIG)
+    return load_rig(path)
+
+
+@pytest.fixture(scope="module")
+def few(with_little_work):
+    with with_little_work():
+        yield
+
+
+def planned(rig, meshes, **asked):
+    return plan_rig(
+        meshes,
+        rig,
+        max_projectors=4,
+        target="surface",
+        check=False,
+        on_miss="return",
+        threads=1,
+        **asked,
+    )
+
+
+@pytest.fixture(scope="module")
+def both(rig, few):
+    """Two plates back to back: no device measures both."""
+    return planned(rig, [plate(1), plate(-1)])
+
+
+@pytest.fixture(scope="module")
+def kept(both, tmp_path_factory):
+    path = tmp_path_factory.mktemp("both") / "plan.json"
+    both.save(path)
+    return path
+
+
+def test_plates_that_face_apart_take_twice_what_one_takes(both, rig, few):
+    alone = plan_rig(
+        plate(1), rig, max_projectors=4, target="surface", check=False, threads=1
+    )
+    assert (len(alone.projectors), len(alone.cameras)) == (1, 1)
+    family = both.document.family
+    assert (len(both.projectors), len(both.cameras)) == (2, 2)
+    for told in (family.projectors, family.cameras):
+        assert (told.lower_bound, told.needed, told.hardest.count) == (2, 2, 1)
+        # Each alone proves no more than what it takes for itself.
+        assert told.over_poses.lower_bound == 1
+
+
+def test_no_plate_is_in_the_way_of_the_other(both):
+    for member in both.members:
+        areas = member.coverage.target
+        assert areas.measured_m2 > 0.95 * areas.area_m2
+
+
+def test_the_share_of_members_that_is_asked_saves_devices(rig, few):
+    half = planned(rig, [plate(1), plate(-1), plate(1, 0.04)], family_quantile=0.6)
+    family = half.document.family
+    assert (len(half.projectors), len(half.cameras)) == (1, 1)
+    assert family.n_asked == 2
+    assert family.left_out == (1,)
+    assert family.projectors.lower_bound == family.cameras.lower_bound == 1
+    assert met(half.members[1]) == 0.0
+    assert half.missed == ()
+    assert verify_plan(half, check_pixels=False, threads=1).passed
+
+
+def test_members_have_the_same_rig_and_each_its_own_claims(both):
+    for member in both.members:
+        for mine, theirs in zip(member.cameras, both.cameras, strict=True):
+            assert np.array_equal(mine.world_from_device, theirs.world_from_device)
+        assert member.of_member
+    assert both.members[0].coverage != both.members[1].coverage
+    assert not both.of_member
+
+
+def test_every_claim_holds_and_what_is_written_is_read(both, kept):
+    again = RigPlan.load(kept)
+    assert again.to_document() == both.to_document()
+    assert verify_plan(again, check_pixels=False, threads=1).failures == ()
+
+
+def test_a_member_may_be_verified_by_itself(kept):
+    member = RigPlan.load(kept.parent / "members" / "member-2" / "plan.json")
+    assert verify_plan(member, check_pixels=False, threads=1).failures == ()
+
+
+def test_one_seed_one_plan_whatever_the_threads(rig, few, both):
+    again = plan_rig(
+        [plate(1), plate(-1)],
+        rig,
+        max_projectors=4,
+        target="surface",
+        check=False,
+        threads=2,
+    )
+    assert again.digest == both.digest
+
+
+def _with_family(plan, **changes):
+    family = plan.document.family.changed(**changes)
+    document = plan.document.changed(family=family)
+    return RigPlan(document, plan.surface, plan.members)
+
+
+def _bounded(plan, kind, **changes):
+    told = getattr(plan.document.family, kind).changed(**changes)
+    return _with_family(plan, **{kind: told})
+
+
+def _moved(plan):
+    """A member whose first camera stands elsewhere."""
+    first, *others = plan.members
+    record = first.document.cameras[0]
+    pose = np.array(record.world_from_device)
+    pose[0, 3] += 1e-3
+    camera = record.changed(world_from_device=pose.tolist())
+    cameras = (camera, *first.document.cameras[1:])
+    moved = RigPlan(first.document.changed(cameras=cameras), first.surface)
+    return RigPlan(plan.document, plan.surface, (moved, *others))
+
+
+def _better(plan):
+    first, *others = plan.document.members
+    areas = first.coverage.target.changed(lit_m2=2.0 * first.coverage.target.area_m2)
+    told = first.changed(coverage=first.coverage.changed(target=areas))
+    document = plan.document.changed(members=(told, *others))
+    return RigPlan(document, plan.surface, plan.members)
+
+
+FALSE = {
+    "fewer asked": (lambda p: _with_family(p, n_asked=1), "n_asked"),
+    "the best is the worst": (
+        lambda p: _with_family(p, worst=1 - p.document.family.worst),
+        "worst",
+    ),
+    "a served one is left out": (lambda p: _with_family(p, left_out=(0, 1)), "family"),
+    "a bound raised": (lambda p: _bounded(p, "cameras", lower_bound=3), "lower_bound"),
+    "a bound lowered": (lambda p: _bounded(p, "cameras", lower_bound=0), "lower_bound"),
+    "a bound over poses raised": (
+        lambda p: _bounded(
+            p,
+            "projectors",
+            over_poses=p.document.family.projectors.over_poses.changed(lower_bound=2),
+        ),
+        "over_poses",
+    ),
+    "another count": (lambda p: _bounded(p, "projectors", count=3), "count"),
+    "another rig for one": (_moved, "projectors differ"),
+    "better than it says itself": (_better, "members.0.coverage"),
+}
+
+
+@pytest.mark.parametrize("name", FALSE)
+def test_what_is_false_of_a_family_is_found(both, name):
+    change, words = FALSE[name]
+    failures = verify_plan(change(both), check_pixels=False, threads=1).failures
+    assert any(words in failure for failure in failures), failures
+
+
+def test_a_member_that_is_another_plan_is_found(both, rig, few):
+    other = planned(rig, [plate(1), plate(-1, 0.05)])
+    told = both.document.family
+    names = [record.name for record in both.document.members]
+    placed = [record.alignment for record in both.document.members]
+    mixed = family_plan((both.members[0], other.members[1]), names, placed, told)
+    failures = verify_plan(mixed, check_pixels=False, threads=1).failures
+    assert any("members.1" in failure for failure in failures)
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"select": [0]}, "selection"),
+        ({"region_coverage": 0.5}, "region_coverage"),
+        ({"robust": 0.9}, "robust"),
+        ({"survive": 1}, "survive"),
+        ({"joint": True}, "joint"),
+        ({"views": 2}, "views"),
+        ({"cameras_by": "paper"}, "paper"),
+        ({"pattern": "none"}, "pattern"),
+    ],
+)
+def test_what_is_of_one_mesh_is_refused(rig, asked, words):
+    asked = {"max_projectors": 0 if asked.get("pattern") == "none" else 2} | asked
+    with pytest.raises(InputError, match=words):
+        plan_rig([plate(1), plate(-1)], rig, **asked)
+
+
+def test_align_and_quantile_are_of_several(rig):
+    for asked in ({"align": "icp"}, {"family_quantile": 0.5}):
+        with pytest.raises(InputError, match="several meshes"):
+            plan_rig(plate(1), rig, max_projectors=1, **asked)
+
+
+def test_a_member_elsewhere_is_refused(kept, tmp_path):
+    document = json.loads(kept.read_text())
+    document["members"][0]["path"] = "../elsewhere/plan.json"
+    (tmp_path / "plan.json").write_text(json.dumps(document))
+    (tmp_path / "surface.npz").write_bytes((kept.parent / "surface.npz").read_bytes())
+    with pytest.raises(PlanFileError, match="elsewhere"):
+        RigPlan.load(tmp_path / "plan.json")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    parts = tmp_path / "parts"
+    parts.mkdir()
+    for name, towards in (("front", 1), ("back", -1)):
+        mesh = plate(towards)
+        lines = [f"v {x} {y} {z}" for x, y, z in 1e3 * mesh.vertices]
+        lines += [f"f {a} {b} {c}" for a, b, c in mesh.faces + 1]
+        (parts / f"{name}.obj").write_text("\n".join(lines))
+    (parts / "notes.txt").write_text("no mesh")
+    (tmp_path / "few.toml").write_text(RIG)
+    return tmp_path
+
+
+def run(*words):
+    return CliRunner().invoke(commands, [str(word) for word in words])
+
+
+@pytest.mark.parametrize("given", ["parts", "parts/*"])
+def test_a_folder_or_a_pattern_names_the_members(few, folder, given):
+    out = folder / "out"
+    ended = run(
+        *("--mesh", folder / given, "--max-projectors", 4, "--target", "surface"),
+        *("--rig", folder / "few.toml", "--no-check", "--no-patterns", "-o", out),
+    )
+    assert ended.exit_code == 0, ended.stderr
+    assert "each of 2 members" in ended.stdout
+    plan = RigPlan.load(out / "plan.json")
+    assert [record.name for record in plan.document.members] == ["back", "front"]
+    page = (out / "report.html").read_text()
+    assert 'href="members/front/report.html"' in page
+    assert (out / "members" / "front" / "report.html").exists()
+    shown = run("show", out, "--family")
+    assert "back" in shown.stdout
+    assert "2 cameras; over candidates at least 2" in shown.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("--mesh", "empty", "--max-projectors", 2), "no mesh there"),
+        (("--mesh", "nothing*.obj", "--max-projectors", 2), "no mesh there"),
+        (("--mesh", "parts", "--max-projectors", 2, "--size-mm", 100), "--size-mm"),
+        (("--mesh", "parts", "--max-projectors", 2, "--select", "f"), "--select"),
+        (("--mesh", "parts"), "--max-projectors"),
+        (("evaluate", "--mesh", "parts", "--poses", "p.csv"), "of one mesh"),
+    ],
+)
+def test_a_family_that_cant_be_is_one_line(folder, monkeypatch, words, told):
+    monkeypatch.chdir(folder)
+    (folder / "empty").mkdir()
+    ended = run(*words)
+    assert ended.exit_code in (2, 3)
+    assert told in ended.stderr
