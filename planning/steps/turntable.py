@@ -23,6 +23,7 @@ from planning.cameras.stations.turntable.table_lattice import (
 )
 from planning.cameras.stations.turntable.table_room import TableRoom, room_of
 from planning.cameras.stations.turntable.table_sets import TableSets
+from planning.cameras.stations.turntable.table_sweep import check_sweep
 from planning.model.device_poses import moved_to
 from planning.model.document.station_records import (
     Placement,
@@ -33,6 +34,7 @@ from planning.model.document.station_records import (
 )
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.progress import Stopwatch
+from planning.model.requirements import Workspace
 from planning.model.words import count_words
 from planning.report.partial_plan import PartialPlan, PlanRequest, Prepared
 from planning.scene.draws import DRAWS
@@ -73,10 +75,12 @@ def steps_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
     table = table.moved(space.origin_m)
     scene = ready.scene.within(about_axis(space, table))
     lattice = TableLattice.about(table, space, ready.templates, ready.cameras)
+    target = scene.target_samples(DRAWS.cameras)
+    room = room_of(scene, lattice, target.samples.points)
+    scene = room.scene
+    if lattice.n_angles > 1:
+        check_sweep(table, scene.mesh, scene.obstructions, room.still, _floor(space))
     with clock.stage("turntable", "turntable: what pairs measure at every angle"):
-        target = scene.target_samples(DRAWS.cameras)
-        room = room_of(scene, lattice, target.samples.points)
-        scene = room.scene
         sets = TableSets.of(scene, lattice, target)
     search = StepSearch.of(scene, sets, room)
     most = min(table.max_steps or lattice.n_angles, lattice.n_angles)
@@ -106,6 +110,14 @@ def steps_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
         if steps is not None:
             partial = _placed(ready, search, traded, taken, clock, steps)
             plan = yield partial, True
+
+
+def _floor(space: Workspace) -> tuple[Array, float] | None:
+    """The direction up, and how high the floor is along it [m]."""
+    if space.floor_m is None:
+        return None
+    up = np.array(space.up)
+    return up, float(np.array(space.centre) @ up) + space.floor_m
 
 
 def _too_little(

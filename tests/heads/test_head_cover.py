@@ -1,5 +1,6 @@
 """What is asked of heads together, against counting by hand and all selections."""
 
+from functools import partial
 from itertools import combinations
 from types import SimpleNamespace
 
@@ -10,6 +11,7 @@ from geometry.mesh.sampling import SurfaceSamples
 from planning.cameras.stations.heads.fewest_heads import _greedy, _lacking_with_each
 from planning.cameras.stations.heads.head_cover import HeadCover, HeadSets
 from planning.scene.samples import Target
+from planning.scene.scene import Scene
 from solvers import solve_cover
 
 N, HEADS, REGIONS = 60, 7, 2
@@ -19,12 +21,14 @@ def _scene(*, floor=0.0):
     required = SimpleNamespace(
         dominant_coverage=0.9, coverage=0.8, region_coverage=floor
     )
-    return SimpleNamespace(
+    scene = SimpleNamespace(
         requirements=required,
         region=np.arange(N) % (REGIONS + 1) - 1,
         large_regions=np.arange(REGIONS),
         seed=0,
     )
+    scene.floor_rows = partial(Scene.floor_rows, scene)
+    return scene
 
 
 def _sets(seed):

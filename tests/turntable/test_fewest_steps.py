@@ -60,7 +60,12 @@ def _search(seed, *, room=None, coverage=0.8, stride=1, hidden=0.0):
     required = SimpleNamespace(
         dominant_coverage=0.6, coverage=coverage, region_coverage=0.0
     )
-    scene = SimpleNamespace(requirements=required, seed=0, check_cancelled=lambda: None)
+    scene = SimpleNamespace(
+        requirements=required,
+        seed=0,
+        check_cancelled=lambda: None,
+        floor_rows=lambda samples, kind: (np.zeros(len(samples), np.int64), 1, 0.0),
+    )
     solid = rng.random((2, CIRCLES, ANGLES, ANGLES, N)) < hidden if hidden else None
     sets = TableSets(_Lattice(stride), target, lit, measured)
     return StepSearch.of(scene, sets, _Room(room, solid))

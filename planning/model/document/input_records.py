@@ -1,10 +1,10 @@
 """What a plan was made from: `meshes`, `surface`, `rig` and `ranges`."""
 
 from collections.abc import Iterable
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from geometry.devices import ParallelModel, PinholeModel
 from planning.model.bodies import Body
@@ -164,6 +164,35 @@ class ModelRecord(Part):
         )
 
 
+class ObstacleRecord(Part):
+    """An obstacle as its rig file has it; lengths in [mm], angles in degrees.
+
+    Attributes:
+        centre_mm: None: of a `table` that stands right under the object.
+    """
+
+    name: str
+    shape: Literal["box", "cylinder", "table", "mesh"]
+    centre_mm: Vector3 | None = None
+    turn_deg: Vector3 = (0.0, 0.0, 0.0)
+    size_mm: Vector3 | None = None
+    radius_mm: float | None = None
+    height_mm: float | None = None
+
+    @model_validator(mode="after")
+    def _has_its_sizes(self) -> Self:
+        sizes: dict[str, tuple[str, ...]] = {
+            "mesh": (),
+            "cylinder": ("radius_mm", "height_mm"),
+        }
+        for name in sizes.get(self.shape, ("size_mm",)):
+            if getattr(self, name) is None:
+                raise ValueError(f"a {self.shape} needs {name}")
+        if self.centre_mm is None and self.shape != "table":
+            raise ValueError(f"a {self.shape} needs centre_mm")
+        return self
+
+
 class RigRecord(Part):
     """The resolved rig; tables whose keys end in _mm or _deg are as in its file.
 
@@ -188,7 +217,7 @@ class RigRecord(Part):
     check: dict[str, float] = Field(default={})
     notes: tuple[str, ...] = ()
     existing: tuple[dict[str, Any], ...] = ()
-    obstacle: tuple[dict[str, Any], ...] = ()
+    obstacle: tuple[ObstacleRecord, ...] = ()
     mounting: dict[str, float] = Field(default={})
     photometry: dict[str, Any] = Field(default={})
     clearance_m: float = 0.0

@@ -58,6 +58,11 @@ def device_ids(
 def rounded_projector(projector: PlannedProjector, name: str) -> PlannedProjector:
     """Return a projector as it will be written; its ring frame moves along with it."""
     device = rounded_pose(projector.world_from_device)
+    if projector.code is not None:
+        # A code of pixels has no rings: their frame is the device's, to the last digit.
+        return replace(
+            projector, id=name, world_from_device=device, world_from_ring=device
+        )
     ring = projector.world_from_ring.copy()
     ring[:3, 3] += device[:3, 3] - projector.world_from_device[:3, 3]
     return replace(

@@ -4,9 +4,12 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from geometry.arrays import Array
 from planning.model.bodies import Obstacle
+from planning.model.document.input_records import ObstacleRecord
+from planning.model.errors import PlanFileError
 from planning.model.plan import RigPlan
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
@@ -39,10 +42,10 @@ def audit_obstacles(case: AuditCase, findings: AuditFindings) -> None:
         back = room_from_world(case.plan, station)
         corners = obstacle.mesh.corners.reshape(-1, 3)
         corners = corners @ back[:3, :3].T + back[:3, 3]
-        if table["shape"] != "mesh":
+        if table.shape != "mesh":
             _audit_shape(case.plan, obstacle, corners, table, findings)
             continue
-        same = first.setdefault(table["name"], corners)
+        same = first.setdefault(table.name, corners)
         findings.holds(
             corners.shape == same.shape and np.abs(corners - same).max() <= _ROUNDING,
             f"obstacle {obstacle.name!r}",
@@ -50,30 +53,46 @@ def audit_obstacles(case: AuditCase, findings: AuditFindings) -> None:
         )
 
 
-def _stated(plan: RigPlan) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
+def _stated(plan: RigPlan) -> Iterator[tuple[str, str, ObstacleRecord]]:
     """Yield name, station and table of each obstacle; of one that stands still by step.
 
     Those that turn with a part come first.
     """
     rig, steps = plan.document.rig, []
     zones = rig.workspace.get("keep_out") or []
-    solid = [{**zone, "shape": "box"} for zone in zones if zone.get("blocks", True)]
+    solid = [_solid(zone) for zone in zones if zone.get("blocks", True)]
     still = set[str]()
     if rig.turntable is not None and plan.document.stations is not None:
-        still = {*rig.turntable.still, *(zone["name"] for zone in solid)}
+        still = {*rig.turntable.still, *(zone.name for zone in solid)}
         steps = [one.id for one in plan.document.stations.stations]
     every = [*rig.obstacle, *solid]
-    yield from ((t["name"], "", t) for t in every if t["name"] not in still)
+    yield from ((t.name, "", t) for t in every if t.name not in still)
     for table in every:
-        if table["name"] in still:
-            yield from ((f"{table['name']} ({s})", s, table) for s in steps)
+        if table.name in still:
+            yield from ((f"{table.name} ({s})", s, table) for s in steps)
+
+
+def _solid(zone: Mapping[str, Any]) -> ObstacleRecord:
+    """Return a keep-out volume that blocks as the box that it is.
+
+    Raises:
+        PlanFileError: If it is none.
+    """
+    try:
+        return ObstacleRecord.model_validate({**zone, "shape": "box"})
+    except ValidationError as error:
+        where = ".".join(map(str, error.errors()[0]["loc"]))
+        raise PlanFileError(
+            f"rig.workspace.keep_out {zone.get('name')!r}: {where or 'it'} is no box "
+            f"({error.errors()[0]['msg']}); plan again"
+        ) from None
 
 
 def _audit_shape(
     plan: RigPlan,
     obstacle: Obstacle,
     corners: Array,
-    table: Mapping[str, Any],
+    table: ObstacleRecord,
     findings: AuditFindings,
 ) -> None:
     """Compare extent in the shape's own frame, and area, with what is stated.
@@ -83,11 +102,11 @@ def _audit_shape(
     space = plan.requirements.workspace
     centre, up = np.array(space.centre), np.array(space.up)
     origin = origin_of(plan)
-    turn = turned(np.radians(table.get("turn_deg", [0.0, 0.0, 0.0])))
-    middle = 1e-3 * np.array(table.get("centre_mm", [0.0, 0.0, 0.0]))
+    turn = turned(np.radians(table.turn_deg))
+    middle = 1e-3 * np.array(table.centre_mm or (0.0, 0.0, 0.0))
     sides, area = _sides_and_area(table)
-    if table["shape"] == "table":
-        if "centre_mm" not in table:
+    if table.shape == "table":
+        if table.centre_mm is None:
             heights = (plan.surface.mesh.corners.reshape(-1, 3) - centre) @ up
             origin, middle = centre, heights.min() * up
         third = int(np.argmax(np.abs(up)))
@@ -105,11 +124,14 @@ def _audit_shape(
     findings.number(f"{key} (area)", obstacle.mesh.area, area, _FACETED * area)
 
 
-def _sides_and_area(table: Mapping[str, Any]) -> tuple[Array, float]:
+def _sides_and_area(table: ObstacleRecord) -> tuple[Array, float]:
     """Sides of the box about a shape [m], and the shape's own area [m²]."""
-    if table["shape"] == "cylinder":
-        radius, height = 1e-3 * table["radius_mm"], 1e-3 * table["height_mm"]
+    if table.shape == "cylinder":
+        radius, height = (
+            1e-3 * (table.radius_mm or 0.0),
+            1e-3 * (table.height_mm or 0.0),
+        )
         sides = np.array([2.0 * radius, 2.0 * radius, height])
         return sides, 2.0 * np.pi * radius * (radius + height)
-    x, y, z = sides = 1e-3 * np.array(table["size_mm"])
+    x, y, z = sides = 1e-3 * np.array(table.size_mm)
     return sides, 2.0 * (x * y + y * z + z * x)

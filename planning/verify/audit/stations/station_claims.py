@@ -7,6 +7,7 @@ from planning.verify.audit.audit_findings import AuditFindings
 
 from .head_claims import audit_heads, audit_reference_heads
 from .step_claims import audit_steps
+from .sweep_claims import audit_sweep
 
 
 def audit_stations(case: AuditCase, findings: AuditFindings) -> None:
@@ -20,6 +21,7 @@ def audit_stations(case: AuditCase, findings: AuditFindings) -> None:
     _audit_members(plan, told, below)
     if told.kind == "turntable":
         audit_steps(plan, told, below)
+        audit_sweep(plan, told, below)
     else:
         audit_heads(plan, told, case, below)
     audit_reference_heads(plan, told, below)
@@ -98,6 +100,8 @@ def _audit_trade(
     told: StationsRecord, count: StationCount, findings: AuditFindings
 ) -> None:
     """Numbers of devices each once, and the row of the plan's own is its count."""
+    if not findings.holds(told.stations, "stations", "are none, of a turntable"):
+        return
     one = told.stations[0]
     own = len(one.projectors), len(one.cameras)
     rows = {(row.projectors, row.cameras): row for row in told.steps}
