@@ -8,6 +8,7 @@ from threadpoolctl import threadpool_limits
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.parallel import n_threads
+from planning.cache.cache import NO_CACHE, Cache
 from planning.model.document.certificates import CamerasBy
 from planning.model.document.ring_records import RingAxis
 from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
@@ -83,6 +84,7 @@ def plan_rig(
     checked: Checked | None = None,
     fixed: Mounted | None = None,
     on_miss: Literal["raise", "return"] = "raise",
+    cache: Cache = NO_CACHE,
 ) -> RigPlan:
     """Plan the projectors and cameras that measure a surface, and check the plan.
 
@@ -139,6 +141,8 @@ def plan_rig(
         fixed: Devices that stay where they are and count, from `read_mounted`.
         on_miss: Whether a plan that misses a requirement is raised with the error, or
             returned.
+        cache: What was answered before, and is kept for later runs: the plan is the
+            same with any; the default keeps nothing.
 
     Returns:
         The plan, every requirement met unless `on_miss` is `return`.
@@ -181,7 +185,9 @@ def plan_rig(
         threadpool_limits(1),
     ):
         request = replace(
-            request_of(mesh, rig, wishes, clock, select=select, weight=weight),
+            request_of(
+                mesh, rig, wishes, clock, select=select, weight=weight, cache=cache
+            ),
             seed=seed,
             threads=threads or n_threads(),
             command=tuple(command),

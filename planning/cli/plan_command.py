@@ -6,9 +6,9 @@ from typing import Any
 
 import click
 
-from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
 from geometry.parallel import n_threads
+from planning.cache.cache import NO_CACHE, Cache
 from planning.model.plan import InterruptedPlanError, RequirementError
 from planning.model.progress import Report, Stopwatch
 from planning.pipeline import plan_rig
@@ -20,6 +20,7 @@ from planning.rig.rig import Rig, load_rig
 from planning.scene.interest import Interest, read_selection, read_weight
 from planning.scene.ranges.ranged_body import RangedBody, read_ranges
 from planning.steps.checked import missed_by
+from planning.steps.recalled_mesh import recalled_mesh
 
 from .console import print_json, progress, writable
 from .lines.object_lines import optics_lines, size_lines
@@ -65,10 +66,11 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
     check, interrupted = not options["no_check"], False
     with writable(folder), progress(quiet=options["quiet"]) as report:
         saved = SavedPlans(folder, report, patterns=not options["no_patterns"])
+        cache = NO_CACHE if options["no_cache"] else Cache.on_disk(report=report)
         with clock.ticking():
             rig = load_rig(options["rig_name"], light=options["light"])
             fixed = _fixed(options["fixed"], rig)
-            surface, interest = _read(path, options, rig, report)
+            surface, interest = _read(path, options, rig, report, cache)
         try:
             plan = plan_rig(
                 surface,
@@ -82,6 +84,7 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
                 command=("plan", *command),
                 keep=saved.keep,
                 checked=saved.checked,
+                cache=cache,
                 **{name: options[name] for name in _ASKED},
             )
         except RequirementError as error:
@@ -112,7 +115,11 @@ def _fixed(words: str | None, rig: Rig) -> Mounted | None:
 
 
 def _read(
-    path: Path, options: Mapping[str, Any], rig: Rig, report: Report
+    path: Path,
+    options: Mapping[str, Any],
+    rig: Rig,
+    report: Report,
+    cache: Cache,
 ) -> tuple[TriangleMesh | RangedBody, Interest | None]:
     """Read what is to be measured, and which part of it is the user's own target."""
     report(f"reading {path}")
@@ -121,7 +128,9 @@ def _read(
         for line in ranges_lines(body):
             report(line)
         return body, None
-    mesh = load_mesh(path, unit=options["unit"], size_mm=options["size_mm"])
+    mesh = recalled_mesh(
+        path, cache, unit=options["unit"], size_mm=options["size_mm"]
+    )
     interest, chosen = _interest(options, mesh)
     for line in (*size_lines(mesh), *optics_lines(rig, mesh), *chosen):
         report(line)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from geometry.mesh.mesh import TriangleMesh
 from geometry.parallel import n_threads
 from geometry.regions.regions import DominantRegions
+from planning.cache.cache import NO_CACHE, Cache
 from planning.cameras.proved_cameras import CameraStage
 from planning.model.document.certificates import CamerasBy
 from planning.model.document.ring_records import AxisTaken, RingAxis
@@ -36,6 +37,7 @@ class PlanRequest:
         evaluates: Whether these are all there will be.
         axis_wanted: Where ring axes stand after all; None: as was asked.
         least_projectors: Projectors at least, though fewer light enough.
+        cache: What was answered before.
     """
 
     mesh: TriangleMesh
@@ -52,6 +54,7 @@ class PlanRequest:
     evaluates: bool = False
     axis_wanted: RingAxis | None = None
     least_projectors: int = 0
+    cache: Cache = NO_CACHE
 
     @property
     def ring_axis(self) -> RingAxis | None:

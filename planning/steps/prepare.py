@@ -13,6 +13,7 @@ from geometry.mesh.bearing import bearing
 from geometry.mesh.mesh import TriangleMesh
 from geometry.regions.regions import DominantRegions, dominant_regions
 from geometry.regions.selected_regions import regions_of_faces
+from planning.cache.cache import NO_CACHE, Cache
 from planning.cameras.camera_cover import camera_candidate_views
 from planning.model.device_poses import moved_to
 from planning.model.errors import InputError
@@ -43,6 +44,7 @@ def request_of(
     *,
     select: Select | None,
     weight: Weight | None,
+    cache: Cache = NO_CACHE,
 ) -> PlanRequest:
     """Return what is asked, of a surface whose long edges are cut.
 
@@ -72,7 +74,9 @@ def request_of(
         )
     if interest is not None:
         interest = interest.on_parts(parent)
-    return PlanRequest(cut, rig, wishes, interest=interest, ranges=ranges)
+    return PlanRequest(
+        cut, rig, wishes, interest=interest, ranges=ranges, cache=cache
+    )
 
 
 def _check_single(rig: Rig) -> None:
@@ -122,7 +126,9 @@ def prepared(request: PlanRequest, clock: Stopwatch) -> Prepared:
     requirements, radii = _resolve(request)
     obstacles = rig.obstacles(requirements.workspace, mesh)
     with clock.stage("regions", "curvature and dominant regions"):
-        field = principal_curvatures(mesh)
+        field = request.cache.recall(
+            "principal_curvatures", (mesh,), lambda: principal_curvatures(mesh)
+        )
         regions = _regions(request, field)
         clock.say(f"  {len(regions)} regions, {regions.dominant_share:.1%} of the area")
     scene = Scene(
@@ -134,6 +140,7 @@ def prepared(request: PlanRequest, clock: Stopwatch) -> Prepared:
         request.threads,
         clock.check,
         obstructions=Obstruction.about(mesh, obstacles, request.threads),
+        cache=request.cache,
     )
     code = rig.table.dense.code() if requirements.pattern == "dense" else None
     templates = tuple(
@@ -171,7 +178,11 @@ def _regions(request: PlanRequest, field: CurvatureField) -> DominantRegions:
     """The user's selection, or else the most curved surface."""
     if request.interest is not None:
         return regions_of_faces(request.mesh, field, request.interest.chosen)
-    regions = dominant_regions(request.mesh, field)
+    regions = request.cache.recall(
+        "dominant_regions",
+        (request.mesh,),
+        lambda: dominant_regions(request.mesh, field),
+    )
     if request.wishes.target != "surface" and not len(regions):
         raise InputError(
             "no dominant region: the surface is flat where its curvature can be "

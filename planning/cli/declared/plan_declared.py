@@ -34,6 +34,7 @@ _GROUPS = {
     ),
     "How it is sought": (
         *("cameras_by", "joint", "prove", "seed", "time_limit", "threads", "no_check"),
+        "no_cache",
     ),
     "Output": (
         *("output", "no_patterns", "no_report"),
@@ -243,6 +244,11 @@ class GroupedCommand(click.Command):
 @threads_option
 @click.option("--prove", is_flag=True, help="Spend more work on the continuous bounds.")
 @click.option("--no-check", is_flag=True, help="Skip the check from pixels.")
+@click.option(
+    "--no-cache",
+    is_flag=True,
+    help="Compute all anew; else what an earlier run left is used (`plan cache`).",
+)
 @click.option("--no-patterns", is_flag=True, help="Write no pattern images.")
 @click.option(
     "--verbose",
