@@ -15,7 +15,7 @@ from platformdirs import user_cache_path
 from planning.model.progress import Report
 
 from .content import code_content, content
-from .entries import LIMIT_BYTES, Entries, FolderEntries, MemoryEntries
+from .entries import Entries, FolderEntries, MemoryEntries
 
 # A folder instead of the user's; empty: nothing is kept on disk.
 VARIABLE = "RINGRIG_CACHE"
@@ -48,11 +48,12 @@ class Cache:
     report: Report = field(default=lambda _: None)
 
     @classmethod
-    def on_disk(cls, folder: Path | None = None, report: Report | None = None) -> "Cache":
-        """Return one that lasts, in this folder or in `cache_folder()`."""
-        folder = folder or cache_folder()
-        entries = None if folder is None else FolderEntries(folder, LIMIT_BYTES)
-        return cls(entries, report or (lambda _: None))
+    def on_disk(
+        cls, folder: str | Path | None = None, report: Report = lambda _: None
+    ) -> "Cache":
+        """Return one that lasts, in this folder or in that of the command line."""
+        place = cache_folder() if folder is None else Path(folder)
+        return cls(None if place is None else FolderEntries(place), report)
 
     @classmethod
     def in_memory(cls) -> "Cache":
@@ -76,19 +77,22 @@ class Cache:
             shared: Objects of the caller that are part of the answer and not kept with
                 it: the next answer holds the next caller's.
         """
-        if self.entries is None:
+        if (entries := self.entries) is None:
             return answer()
         key = content(name, code_content(), inputs)
-        kept = self.entries.get(key)
+        kept = entries.get(key)
         if kept is not None:
             with suppress(pickle.UnpicklingError):
                 return _Unpickler(kept, shared).load()
         made = answer()
         data = _pickled(made, shared)
         try:
-            self.entries.put(key, data)
+            entries.put(key, data)
         except OSError as error:
-            self.report(f"no cache: {error.strerror or error} ({error.filename})")
+            self.report(
+                f"{error.filename}: nothing is kept for later runs ({error.strerror}); "
+                f"name another folder in {VARIABLE}, or leave it with --no-cache"
+            )
             self.entries = None
         return made
 
@@ -131,7 +135,7 @@ class _Pickler(pickle.Pickler):
 
 
 class _Unpickler(pickle.Unpickler):
-    """Reads values of ours and arrays: a file that was put there by others runs none."""
+    """Reads values of ours and arrays, so that no file runs what others put there."""
 
     def __init__(self, data: bytes, shared: Sequence[object]) -> None:
         super().__init__(io.BytesIO(data))

@@ -71,7 +71,7 @@ def _feed(update: _Update, value: Any) -> None:  # noqa: ANN401
         if array.dtype.hasobject:
             raise TypeError(f"an array of {array.dtype} has no content to hash")
         _plain(update, "array", array.dtype.str, np.shape(value))
-        update(memoryview(array.reshape(-1).view(np.uint8)))
+        update(array.reshape(-1).view(np.uint8).data)
     elif isinstance(value, TriangleMesh):
         if value not in _meshes:
             _meshes[value] = content(value.vertices, value.faces)

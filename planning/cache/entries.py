@@ -80,10 +80,13 @@ class FolderEntries:
         Raises:
             OSError: If it can't be written.
         """
-        self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        write_atomically(
-            self._path(key), lambda file: file.writelines((_checksum(value), value))
-        )
+        try:
+            self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            write_atomically(
+                self._path(key), lambda file: file.writelines((_checksum(value), value))
+            )
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(self.folder)) from None
         self._make_room()
 
     def size(self) -> tuple[int, int]:

@@ -1,6 +1,6 @@
 """What `plan --mesh` and `plan --ranges` do."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +9,7 @@ import click
 from geometry.mesh.mesh import TriangleMesh
 from geometry.parallel import n_threads
 from planning.cache.cache import NO_CACHE, Cache
-from planning.model.plan import InterruptedPlanError, RequirementError
+from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
 from planning.model.progress import Report, Stopwatch
 from planning.pipeline import plan_rig
 from planning.report.entries.range_entries import ranges_lines
@@ -22,7 +22,7 @@ from planning.scene.ranges.ranged_body import RangedBody, read_ranges
 from planning.steps.checked import missed_by
 from planning.steps.recalled_mesh import recalled_mesh
 
-from .console import print_json, progress, writable
+from .console import print_json, progress, reporter, writable
 from .lines.object_lines import optics_lines, size_lines
 from .saved_plans import SavedPlans
 
@@ -55,7 +55,37 @@ _OURS = 0.95
 
 def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
     """Plan, write the output folder, print the result; return the exit code."""
-    begin, limit = click.get_current_context().obj, options["time_limit"]
+    begin = click.get_current_context().obj
+    return planned_once(options, command, cache_of(options), begin=begin)[0]
+
+
+def cache_of(options: Mapping[str, Any]) -> Cache:
+    """Return what earlier runs left, unless it isn't wanted."""
+    report = reporter(quiet=options["quiet"])
+    return NO_CACHE if options["no_cache"] else Cache.on_disk(report=report)
+
+
+def planned_once(
+    options: Mapping[str, Any],
+    command: Sequence[str],
+    cache: Cache,
+    *,
+    begin: float | None = None,
+    news: Callable[[RigPlan], Iterable[str]] = lambda _: (),
+) -> tuple[int, RigPlan]:
+    """Plan, write the output folder and print the result.
+
+    Args:
+        options: Of the command line.
+        command: Its words.
+        cache: What was answered before.
+        begin: When the time limit began, on the monotonic clock [s]; None: now.
+        news: Returns lines about a plan that stands and isn't checked yet.
+
+    Returns:
+        The exit code, and the plan that stands.
+    """
+    limit = options["time_limit"]
     limit = None if limit is None else _OURS * limit
     clock = Stopwatch(time_limit=limit, begin=begin)
     path = Path(options["ranges"] or options["meshes"][0])
@@ -66,7 +96,12 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
     check, interrupted = not options["no_check"], False
     with writable(folder), progress(quiet=options["quiet"]) as report:
         saved = SavedPlans(folder, report, patterns=not options["no_patterns"])
-        cache = NO_CACHE if options["no_cache"] else Cache.on_disk(report=report)
+
+        def keep(plan: RigPlan) -> None:
+            saved.keep(plan)
+            for line in news(plan):
+                report(line)
+
         with clock.ticking():
             rig = load_rig(options["rig_name"], light=options["light"])
             fixed = _fixed(options["fixed"], rig)
@@ -82,7 +117,7 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
                 time_limit=clock.remaining,
                 progress=report,
                 command=("plan", *command),
-                keep=saved.keep,
+                keep=keep,
                 checked=saved.checked,
                 cache=cache,
                 **{name: options[name] for name in _ASKED},
@@ -102,8 +137,8 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
         told = summary if options["verbose"] else brief
         click.echo(told(plan, saved.files, missed))
     if interrupted:
-        return InterruptedPlanError.exit_code
-    return RequirementError.exit_code if missed else 0
+        return InterruptedPlanError.exit_code, plan
+    return RequirementError.exit_code if missed else 0, plan
 
 
 def _fixed(words: str | None, rig: Rig) -> Mounted | None:
@@ -128,9 +163,7 @@ def _read(
         for line in ranges_lines(body):
             report(line)
         return body, None
-    mesh = recalled_mesh(
-        path, cache, unit=options["unit"], size_mm=options["size_mm"]
-    )
+    mesh = recalled_mesh(path, cache, unit=options["unit"], size_mm=options["size_mm"])
     interest, chosen = _interest(options, mesh)
     for line in (*size_lines(mesh), *optics_lines(rig, mesh), *chosen):
         report(line)

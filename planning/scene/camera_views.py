@@ -95,7 +95,9 @@ class CandidateViews:
     def content(self) -> str:
         """A hash of the cameras and of all that their views depend on."""
         scene = self._scene
-        return content(self.cameras, scene.mesh, scene.requirements.camera, scene.bodies)
+        return content(
+            self.cameras, scene.mesh, scene.requirements.camera, scene.bodies
+        )
 
     def joined(self, more: Sequence[PlannedCamera]) -> "CandidateViews":
         """Return the views of these cameras, then of more; what is known is kept."""

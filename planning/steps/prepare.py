@@ -74,9 +74,7 @@ def request_of(
         )
     if interest is not None:
         interest = interest.on_parts(parent)
-    return PlanRequest(
-        cut, rig, wishes, interest=interest, ranges=ranges, cache=cache
-    )
+    return PlanRequest(cut, rig, wishes, interest=interest, ranges=ranges, cache=cache)
 
 
 def _check_single(rig: Rig) -> None:

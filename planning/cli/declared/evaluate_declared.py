@@ -21,6 +21,7 @@ _OF_PLANS = {
     "robust": None,
     "prove": False,
     "cameras_by": "both",
+    "watch": None,
 }
 
 
