@@ -71,7 +71,7 @@ def planned_once(
     cache: Cache,
     *,
     begin: float | None = None,
-    news: Callable[[RigPlan], Iterable[str]] = lambda _: (),
+    news: Callable[[RigPlan], Iterable[str]] = lambda plan: (),
 ) -> tuple[int, RigPlan]:
     """Plan, write the output folder and print the result.
 
@@ -80,7 +80,7 @@ def planned_once(
         command: Its words.
         cache: What was answered before.
         begin: When the time limit began, on the monotonic clock [s]; None: now.
-        news: Returns lines about a plan that stands and isn't checked yet.
+        news: Returns lines about a plan that stands, before it is checked.
 
     Returns:
         The exit code, and the plan that stands.
@@ -97,10 +97,17 @@ def planned_once(
     with writable(folder), progress(quiet=options["quiet"]) as report:
         saved = SavedPlans(folder, report, patterns=not options["no_patterns"])
 
+        told: set[str] = set()
+
+        def tell(plan: RigPlan) -> None:
+            if plan.digest not in told:
+                told.add(plan.digest)
+                for line in news(plan):
+                    report(line)
+
         def keep(plan: RigPlan) -> None:
             saved.keep(plan)
-            for line in news(plan):
-                report(line)
+            tell(plan)
 
         with clock.ticking():
             rig = load_rig(options["rig_name"], light=options["light"])
@@ -127,15 +134,16 @@ def planned_once(
         except InterruptedPlanError as error:
             plan, interrupted = error.plan, True
         plan = saved.finish(plan, clock)
+        tell(plan)
         if not options["no_report"] and not interrupted:
             saved.write_page(plan, clock, threads)
     missed = () if interrupted else missed_by(plan, check=check)
     if options["as_json"]:
-        told = {"files": saved.files, "missed": list(missed)}
-        print_json(plan.to_document() | told)
+        ours = {"files": saved.files, "missed": list(missed)}
+        print_json(plan.to_document() | ours)
     else:
-        told = summary if options["verbose"] else brief
-        click.echo(told(plan, saved.files, missed))
+        words = summary if options["verbose"] else brief
+        click.echo(words(plan, saved.files, missed))
     if interrupted:
         return InterruptedPlanError.exit_code, plan
     return RequirementError.exit_code if missed else 0, plan

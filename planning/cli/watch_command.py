@@ -38,8 +38,8 @@ def watch_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
             tell(str(error))
         if last is not None and last[0] == InterruptedPlanError.exit_code:
             return last[0]
-        tell(f"waiting for {' or '.join(files)} to be saved; Ctrl-C ends")
         try:
+            tell(f"waiting for {' or '.join(files)} to be saved; Ctrl-C ends")
             _wait(paths, before)
         except KeyboardInterrupt:
             if last is None:
