@@ -14,6 +14,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from geometry.mesh.mesh import TriangleMesh
+from planning.model.planned import PlannedCamera, PlannedProjector
 
 _Update = Callable[[bytes | memoryview], None]
 
@@ -21,7 +22,9 @@ _Update = Callable[[bytes | memoryview], None]
 _ABOVE = ("cli", "experiments", "handover", "report", "verify")
 # Another version of these may round otherwise.
 _LIBRARIES = ("numpy", "scipy", "libigl", "trimesh", "embreex", "casadi", "highspy")
-_meshes: WeakKeyDictionary[TriangleMesh, str] = WeakKeyDictionary()
+# Values that are asked for again and again, and never change.
+_VALUES = TriangleMesh, PlannedProjector, PlannedCamera
+_known: WeakKeyDictionary[object, str] = WeakKeyDictionary()
 
 
 def content(*values: object) -> str:
@@ -72,19 +75,19 @@ def _feed(update: _Update, value: Any) -> None:  # noqa: ANN401
             raise TypeError(f"an array of {array.dtype} has no content to hash")
         _plain(update, "array", array.dtype.str, np.shape(value))
         update(array.reshape(-1).view(np.uint8).data)
-    elif isinstance(value, TriangleMesh):
-        if value not in _meshes:
-            _meshes[value] = content(value.vertices, value.faces)
-        _plain(update, "mesh", _meshes[value])
+    elif isinstance(value, _VALUES):
+        if value not in _known:
+            _known[value] = content(*_parts(value))
+        _plain(update, type(value).__qualname__, _known[value])
     elif isinstance(value, BaseModel):
         _plain(update, type(value).__qualname__, value.model_dump_json())
     elif isinstance(own := getattr(value, "content", None), str):
         _plain(update, type(value).__qualname__, own)
     elif is_dataclass(value):
-        names = [field.name for field in fields(value)]
-        _plain(update, type(value).__qualname__, names)
-        for name in names:
-            _feed(update, getattr(value, name))
+        parts = _parts(value)
+        _plain(update, type(value).__qualname__, len(parts))
+        for part in parts:
+            _feed(update, part)
     elif isinstance(value, Mapping):
         _plain(update, "mapping", len(value))
         for key in sorted(value):
@@ -95,6 +98,12 @@ def _feed(update: _Update, value: Any) -> None:  # noqa: ANN401
             _feed(update, item)
     else:
         raise TypeError(f"a {type(value).__name__} has no content to hash")
+
+
+def _parts(value: Any) -> tuple[object, ...]:  # noqa: ANN401
+    if isinstance(value, TriangleMesh):
+        return value.vertices, value.faces
+    return tuple(getattr(value, field.name) for field in fields(value))
 
 
 def _plain(update: _Update, *words: object) -> None:

@@ -153,7 +153,11 @@ class Scene:
     @cached_property
     def shell(self) -> MeshShell:
         """Whether the mesh is hollow, and what of it lies inside."""
-        return measure_shell(self.visibility.caster)
+        return self.cache.recall(
+            "measure_shell",
+            (self.mesh,),
+            lambda: measure_shell(self.visibility.caster),
+        )
 
     @cached_property
     def target_faces(self) -> NDArray[np.bool_]:
