@@ -8,8 +8,11 @@ from ._siblings import check_siblings
 if TYPE_CHECKING:
     from geometry.files.readers import load_mesh as load_mesh
     from geometry.mesh.mesh import MeshError as MeshError
+    from planning.cache.cache import Cache as Cache
     from planning.handover.handed_plan import HandedPlan
+    from planning.handover.planner import Planner as Planner
     from planning.handover.planner import plan_rig as plan_rig
+    from planning.handover.planner import prepare as prepare
     from planning.handover.planner import sweep as sweep
     from planning.model.errors import CalibrationError as CalibrationError
     from planning.model.errors import CapturesError as CapturesError
@@ -37,7 +40,8 @@ if TYPE_CHECKING:
 _EXPORTS = {
     "geometry.files.readers": ("load_mesh",),
     "geometry.mesh.mesh": ("MeshError",),
-    "planning.handover.planner": ("plan_rig", "sweep"),
+    "planning.cache.cache": ("Cache",),
+    "planning.handover.planner": ("Planner", "plan_rig", "prepare", "sweep"),
     "planning.model.errors": (
         *("CalibrationError", "CapturesError", "InfeasibleLimitsError", "InputError"),
         *("PlanFileError", "PlanningError", "RigError", "TimeLimitError"),

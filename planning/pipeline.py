@@ -8,6 +8,7 @@ from threadpoolctl import threadpool_limits
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.parallel import n_threads
+from planning.cache.cache import NO_CACHE, Cache
 from planning.model.document.certificates import CamerasBy
 from planning.model.document.family_records import AlignedBy
 from planning.model.document.ring_records import RingAxis
@@ -88,6 +89,7 @@ def plan_rig(
     checked: Checked | None = None,
     fixed: Mounted | None = None,
     on_miss: Literal["raise", "return"] = "raise",
+    cache: Cache = NO_CACHE,
 ) -> RigPlan:
     """Plan the projectors and cameras that measure a surface, and check the plan.
 
@@ -148,6 +150,8 @@ def plan_rig(
         fixed: Devices that stay where they are and count, from `read_mounted`.
         on_miss: Whether a plan that misses a requirement is raised with the error, or
             returned.
+        cache: What was answered before, and is kept for later runs: the plan is the
+            same with any; the default keeps nothing.
 
     Returns:
         The plan, every requirement met unless `on_miss` is `return`.
@@ -196,6 +200,7 @@ def plan_rig(
                 weight=weight,
                 align=align,
                 family_quantile=family_quantile,
+                cache=cache,
             ),
             seed=seed,
             threads=threads or n_threads(),

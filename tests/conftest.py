@@ -2,6 +2,7 @@
 
 import gc
 import importlib
+import os
 import sys
 from collections.abc import Callable, Generator
 from contextlib import AbstractContextManager, contextmanager
@@ -32,7 +33,11 @@ _LONGEST = (
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Keep the order of the files below, where xdist would sort them by tests."""
+    """Keep the order of the files below, where xdist would sort them by tests.
+
+    And no cache: tests write nothing to a home, and patch what keys know nothing of.
+    """
+    os.environ["RINGRIG_CACHE"] = ""
     if hasattr(config.option, "loadscopereorder"):
         config.option.loadscopereorder = False
 

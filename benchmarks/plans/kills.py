@@ -4,14 +4,17 @@ Usage: python -m benchmarks.plans.kills [--moments 20] [--seed 0]   (ringrig ins
     from a checkout)
 
 Plans a plate with seed 0 into a folder, checked and reconstructed, and puts a
-stranger's file beside. Then the same job with seed 1 into a copy of that folder
-is killed, by SIGKILL and by SIGTERM, at moments drawn from a run that is left alone:
-a tenth of them while it plans, half from the first line of saving until the plan is
-written, the rest in the check and the last saving. Of every folder that is left:
-plan.json, surface.npz, patterns and picture carry one plan's digest, none of its files
-is missing, and the stranger's file is there. Afterwards a run to the end replaces the
-plan, and what killed runs left beside the folder is cleaned up. Prints a table; returns
-1 if anything isn't so.
+stranger's file beside. Then the same job with seed 1 into a copy of that folder, with a
+cache that is empty, is killed, by SIGKILL and by SIGTERM, at moments drawn from a run
+that is left alone: three in ten of them while it plans, as many from the first line of
+saving until the plan is written, the rest in the check and the last saving. Of every
+folder that is left: plan.json, surface.npz, patterns and picture carry one plan's
+digest, none of its files is missing, the audit believes the plan, and the stranger's
+file is there; of the cache, that every entry is whole and what else is there is a
+file's beginning. Every other run is killed in an empty folder instead, where no plan
+may stand either. Afterwards a run to the end, with what the last one left in the cache,
+replaces the plan by the one that is planned without; and what killed runs left beside
+the folder is cleaned up. Prints a table; returns 1 if anything isn't so.
 """
 
 import argparse
@@ -25,13 +28,15 @@ import sys
 import tempfile
 import time
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import trimesh
 from PIL import Image
 
-from planning import RigPlan
+from planning import RigPlan, verify_plan
+from planning.cache.entries import FolderEntries
 from planning.verify.reconstruction.check.cloud_file import is_cloud
 
 RUN = [sys.executable, "-c", "from planning.cli.main import main; main()"]
@@ -95,14 +100,16 @@ def main() -> int:
         (place / "old" / STRANGER).parent.mkdir()
         (place / "old" / STRANGER).write_text("mine")
         lines = _run(place, place / "alone", 1)
+        # From here on runs keep answers; this package lets none do so otherwise.
+        os.environ["RINGRIG_CACHE"] = str(place / "cache")
         moments = _moments(lines, options.moments, np.random.default_rng(options.seed))
         print(
             "| moment | signal | exit | stands there | wrong |\n|---|---|---|---|---|"
         )
         wrong: list[str] = []
-        for moment in moments:
+        for k, moment in enumerate(moments):
             for number in (signal.SIGKILL, signal.SIGTERM):
-                left = _killed(place, moment, number)
+                left = _killed(place, moment, number, over_old=k % 2 == 0)
                 wrong += left.wrong
                 print(
                     f"| {moment.line} + {moment.delay:.2f} s | {number.name} "
@@ -150,15 +157,16 @@ def _words(line: str) -> str:
 def _moments(
     lines: list[tuple[str, float]], n: int, rng: np.random.Generator
 ) -> list[Moment]:
-    """A tenth while it plans, half while it saves, the rest in check and last saving.
+    """Three in ten while it plans, as many while it saves, the rest afterwards.
 
     Each falls into a gap between two lines, as often as the gap is long.
     """
     names = [words for words, _ in lines]
     drawing = names.index("drawing")
     written = next(k for k, words in enumerate(names) if "NOT CHECKED yet" in words)
-    parts = ((0, drawing, n // 10), (drawing, written, n // 2))
-    parts += ((written, len(names) - 1, n - n // 10 - n // 2),)
+    some = 3 * n // 10
+    parts = ((0, drawing, some), (drawing, written, some))
+    parts += ((written, len(names) - 1, n - 2 * some),)
     moments: list[Moment] = []
     for first, last, count in parts:
         ends = rng.uniform(lines[first][1], lines[last][1], count)
@@ -168,10 +176,14 @@ def _moments(
     return moments
 
 
-def _killed(place: Path, moment: Moment, number: signal.Signals) -> Left:
+def _killed(
+    place: Path, moment: Moment, number: signal.Signals, *, over_old: bool
+) -> Left:
     folder = place / "run"
     shutil.rmtree(folder, ignore_errors=True)
-    shutil.copytree(place / "old", folder)
+    shutil.rmtree(place / "cache", ignore_errors=True)
+    if over_old:
+        shutil.copytree(place / "old", folder)
     with _started(place, folder, 1) as process:
         assert process.stderr is not None
         for line in process.stderr:
@@ -180,11 +192,33 @@ def _killed(place: Path, moment: Moment, number: signal.Signals) -> Left:
                 process.send_signal(number)
                 break
         process.communicate()
-    return Left(process.returncode, *_standing(folder))
+    broken = _broken(place / "cache")
+    if not over_old and not (folder / "plan.json").exists():
+        return Left(process.returncode, "none", broken)
+    plan, wrong = _standing(folder, over_old=over_old)
+    return Left(process.returncode, plan, (*wrong, *broken))
 
 
-def _standing(folder: Path) -> tuple[str, tuple[str, ...]]:
-    """Say which plan stands in a folder, and what of it isn't whole."""
+def _broken(folder: Path) -> tuple[str, ...]:
+    """Say which entries of a cache aren't whole, or are none."""
+    entries = FolderEntries(folder)
+    named = [path for path in folder.glob("*") if not path.name.startswith(".")]
+    # An entry that is no whole one is dropped by who reads it.
+    return tuple(
+        f"{path.name} in the cache" for path in named if entries.get(path.stem) is None
+    )
+
+
+@cache
+def _believed(digest: str, folder: Path) -> bool:
+    """Whether the audit finds no false claim; a plan of a digest is asked once."""
+    plan = RigPlan.load(folder / "plan.json")
+    assert plan.digest == digest
+    return verify_plan(plan, check_pixels=False).passed
+
+
+def _standing(folder: Path, *, over_old: bool) -> tuple[str, tuple[str, ...]]:
+    """Say which plan stands there, maybe over an old one, and what isn't whole."""
     wrong: list[str] = []
     # It refuses a surface of another plan.
     plan = RigPlan.load(folder / "plan.json")
@@ -196,10 +230,12 @@ def _standing(folder: Path) -> tuple[str, tuple[str, ...]]:
     named = sum(len(one["frames"]) for one in manifest["projectors"])
     if named != len(list((folder / "patterns").glob("*/*.png"))):
         wrong.append("patterns are missing")
-    if not (folder / STRANGER).exists():
+    if not _believed(plan.digest, folder):
+        wrong.append("the audit finds false claims")
+    if over_old and not (folder / STRANGER).exists():
         wrong.append("the stranger's file is gone")
     new = plan.document.seed == 1
-    if new == (folder / CLOUD).exists():
+    if over_old and new == (folder / CLOUD).exists():
         wrong.append(f"an older {CLOUD}" if new else f"{CLOUD} is gone")
     words = ["new" if new else "old"]
     if plan.document.truncated:
@@ -213,8 +249,13 @@ def _cleaned_up(place: Path) -> list[str]:
     remnants = list(place.glob(".run.*"))
     for remnant in remnants:
         os.utime(remnant, (1.0, 1.0))
+    shutil.rmtree(place / "run", ignore_errors=True)
+    shutil.copytree(place / "old", place / "run")
     _run(place, place / "run", 1)
-    plan, wrong = _standing(place / "run")
+    plan, wrong = _standing(place / "run", over_old=True)
+    plans = [RigPlan.load(place / name / "plan.json") for name in ("run", "alone")]
+    if plans[0].digest != plans[1].digest:
+        wrong = (*wrong, "another plan with the cache than without")
     print(f"\n{len(remnants)} remnants of killed runs; after a run to the end: {plan}")
     still = [f"{path.name} is left" for path in place.glob(".run.*")]
     return [*wrong, *still]

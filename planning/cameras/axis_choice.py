@@ -79,9 +79,7 @@ def no_axes_need_fewer(scene: Scene, cover: CameraCover) -> bool:
     """
     if cover.selection.status == "infeasible":
         return False
-    seen = np.zeros_like(cover.measured)
-    for camera, view in enumerate(cover.candidates.on(cover.samples.target)):
-        seen[view.samples, camera] = True
+    seen = cover.candidates.seen(cover.samples.target)
     seen &= np.any(cover.measured, axis=1)[:, None]
     cameras = cover.candidates.cameras
     problem = candidate_cover(scene, seen, cover.samples, cameras).problem

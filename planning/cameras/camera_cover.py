@@ -26,6 +26,7 @@ from planning.scene.measured import (
 from planning.scene.placed_bodies import existing_devices
 from planning.scene.samples import Target, merged
 from planning.scene.scene import Scene
+from solvers.bit_rows import pack_rows, unpack_rows
 
 _ROUNDS = 3
 
@@ -172,9 +173,16 @@ def measured_of(
     target: Target,
 ) -> tuple[LitSamples, NDArray[np.bool_]]:
     """Return which of some samples are lit, and which candidate measures which."""
-    samples = lit_samples(scene, projectors, target)
-    views = candidates.on(samples.target)
-    return samples, measured_by(scene, candidates.cameras, samples, views)
+    samples, cameras = lit_samples(scene, projectors, target), candidates.cameras
+
+    def answer() -> NDArray[np.uint64]:
+        views = candidates.on(samples.target)
+        return pack_rows(measured_by(scene, cameras, samples, views))
+
+    limits = scene.requirements.triangulation
+    inputs = candidates, samples, limits
+    rows = scene.cache.recall("measured_by", inputs, answer)
+    return samples, unpack_rows(rows, len(cameras))
 
 
 def candidate_cover(

@@ -239,7 +239,7 @@ def run(command: Callable[[], int], *, debug: bool) -> None:
             leave(code)
         sys.exit(code)
     except KeyboardInterrupt:
-        _tell("interrupted before a first plan stood; nothing was written")
+        tell("interrupted before a first plan stood; nothing was written")
         leave(_INTERRUPTED)
     except BrokenPipeError:
         # Whoever reads stdout has had enough; Python must not complain at exit.
@@ -249,7 +249,7 @@ def run(command: Callable[[], int], *, debug: bool) -> None:
         if debug:
             raise
         if isinstance(error, TimeLimitError):
-            _tell(str(error))
+            tell(str(error))
             leave(error.exit_code)
         code = 2 if isinstance(error, OSError) else getattr(error, "exit_code", 3)
         stop(str(error), code)
@@ -266,7 +266,7 @@ def run(command: Callable[[], int], *, debug: bool) -> None:
 
 def stop(message: str, code: int) -> NoReturn:
     """Write a line to stderr for each line of a message; leave with an exit code."""
-    _tell(message)
+    tell(message)
     sys.exit(code)
 
 
@@ -277,6 +277,7 @@ def leave(code: int) -> NoReturn:
     os._exit(code)
 
 
-def _tell(message: str) -> None:
+def tell(message: str) -> None:
+    """Write a line to stderr for each line of a message."""
     for line in message.splitlines():
         click.echo(f"plan: {' '.join(line.split())}", err=True)

@@ -17,6 +17,7 @@ from planning.cli.declared.evaluate_declared import evaluate
 from planning.cli.declared.export_declared import export
 from planning.cli.declared.other_declared import (
     accept,
+    cache,
     compare,
     report,
     sample,
@@ -111,7 +112,7 @@ def commands() -> None:
 
 for _command in (
     *(rig_command, evaluate, verify, accept, show, reconstruct, tolerance, export),
-    *(compare, report, lens, calibrate, play, rigs, schema, sample),
+    *(compare, report, lens, calibrate, play, rigs, schema, cache, sample),
 ):
     commands.add_command(_command)
 

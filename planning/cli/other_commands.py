@@ -1,4 +1,4 @@
-"""What `plan sample` and `calibrate` do."""
+"""What `plan sample`, `calibrate` and `cache` do."""
 
 import math
 from collections.abc import Mapping
@@ -16,8 +16,11 @@ from geometry.shapes.sample_head.sample_head import (
     head_as_obj,
     sample_head,
 )
+from planning.cache.cache import VARIABLE, cache_folder
+from planning.cache.entries import FolderEntries
 from planning.model.files import write_atomically
 from planning.model.plan import RigPlan
+from planning.model.words import count_words
 from planning.verify.board_images.board import board_for
 from planning.verify.board_images.board_lines import (
     board_document,
@@ -84,6 +87,24 @@ def sample_command(output: Path, faces: int, variant: int | None) -> int:
     shape = HeadShape() if variant is None else HeadShape.random(variant)
     write_sample(output, shape=shape, n_faces=faces)
     click.echo(f"wrote {output}: a head in millimetres, face along -y, up z")
+    return 0
+
+
+def cache_command(*, clear: bool) -> int:
+    """Say where the cache is and what it holds, or drop it."""
+    folder = cache_folder()
+    if folder is None:
+        click.echo(f"{VARIABLE} is empty: nothing is kept for later runs")
+        return 0
+    entries = FolderEntries(folder)
+    count, size = entries.size()
+    held = f"{count_words(count, 'answer')}, {1e-6 * size:.1f} MB"
+    if clear:
+        entries.clear()
+        click.echo(f"{folder}: {held}, now cleared")
+    else:
+        limit = f"{1e-6 * entries.limit_bytes:.0f} MB at most"
+        click.echo(f"{folder}: {held}, {limit}; `plan cache clear` drops it")
     return 0
 
 

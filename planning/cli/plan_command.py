@@ -1,16 +1,16 @@
 """What `plan --mesh` and `plan --ranges` do."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
-from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
 from geometry.parallel import n_threads
+from planning.cache.cache import NO_CACHE, Cache
 from planning.model.errors import InputError
-from planning.model.plan import InterruptedPlanError, RequirementError
+from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
 from planning.model.progress import Report, Stopwatch
 from planning.pipeline import plan_rig
 from planning.report.entries.range_entries import ranges_lines
@@ -21,8 +21,9 @@ from planning.rig.rig import Rig, load_rig
 from planning.scene.interest import Interest, read_selection, read_weight
 from planning.scene.ranges.ranged_body import RangedBody, read_ranges
 from planning.steps.checked import missed_by
+from planning.steps.recalled_mesh import recalled_mesh
 
-from .console import print_json, progress, writable
+from .console import print_json, progress, reporter, writable
 from .lines.object_lines import optics_lines, size_lines
 from .saved_plans import SavedPlans
 
@@ -57,7 +58,37 @@ _OURS = 0.95
 
 def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
     """Plan, write the output folder, print the result; return the exit code."""
-    begin, limit = click.get_current_context().obj, options["time_limit"]
+    begin = click.get_current_context().obj
+    return planned_once(options, command, cache_of(options), begin=begin)[0]
+
+
+def cache_of(options: Mapping[str, Any]) -> Cache:
+    """Return what earlier runs left, unless it isn't wanted."""
+    report = reporter(quiet=options["quiet"])
+    return NO_CACHE if options["no_cache"] else Cache.on_disk(report=report)
+
+
+def planned_once(
+    options: Mapping[str, Any],
+    command: Sequence[str],
+    cache: Cache,
+    *,
+    begin: float | None = None,
+    news: Callable[[RigPlan], Iterable[str]] = lambda plan: (),
+) -> tuple[int, RigPlan]:
+    """Plan, write the output folder and print the result.
+
+    Args:
+        options: Of the command line.
+        command: Its words.
+        cache: What was answered before.
+        begin: When the time limit began, on the monotonic clock [s]; None: now.
+        news: Returns lines about a plan that stands, before it is checked.
+
+    Returns:
+        The exit code, and the plan that stands.
+    """
+    limit = options["time_limit"]
     limit = None if limit is None else _OURS * limit
     clock = Stopwatch(time_limit=limit, begin=begin)
     path = Path(options["ranges"] or options["meshes"][0])
@@ -70,13 +101,26 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
     check, interrupted = not options["no_check"], False
     with writable(folder), progress(quiet=options["quiet"]) as report:
         saved = SavedPlans(folder, report, patterns=not options["no_patterns"])
+
+        told: set[str] = set()
+
+        def tell(plan: RigPlan) -> None:
+            if plan.digest not in told:
+                told.add(plan.digest)
+                for line in news(plan):
+                    report(line)
+
+        def keep(plan: RigPlan) -> None:
+            saved.keep(plan)
+            tell(plan)
+
         with clock.ticking():
             rig = load_rig(options["rig_name"], light=options["light"])
             fixed = _fixed(options["fixed"], rig)
             surface, interest = (
-                (_family(options, rig, report), None)
+                (_family(options, rig, report, cache), None)
                 if several
-                else _read(path, options, rig, report)
+                else _read(path, options, rig, report, cache)
             )
         try:
             plan = plan_rig(
@@ -89,8 +133,9 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
                 time_limit=clock.remaining,
                 progress=report,
                 command=("plan", *command),
-                keep=saved.keep,
+                keep=keep,
                 checked=saved.checked,
+                cache=cache,
                 **{name: options[name] for name in _ASKED},
             )
         except RequirementError as error:
@@ -98,18 +143,19 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
         except InterruptedPlanError as error:
             plan, interrupted = error.plan, True
         plan = saved.finish(plan, clock)
+        tell(plan)
         if not options["no_report"] and not interrupted:
             saved.write_page(plan, clock, threads)
     missed = () if interrupted else missed_by(plan, check=check)
     if options["as_json"]:
-        told = {"files": saved.files, "missed": list(missed)}
-        print_json(plan.to_document() | told)
+        ours = {"files": saved.files, "missed": list(missed)}
+        print_json(plan.to_document() | ours)
     else:
-        told = summary if options["verbose"] else brief
-        click.echo(told(plan, saved.files, missed))
+        words = summary if options["verbose"] else brief
+        click.echo(words(plan, saved.files, missed))
     if interrupted:
-        return InterruptedPlanError.exit_code
-    return RequirementError.exit_code if missed else 0
+        return InterruptedPlanError.exit_code, plan
+    return RequirementError.exit_code if missed else 0, plan
 
 
 def _fixed(words: str | None, rig: Rig) -> Mounted | None:
@@ -121,7 +167,11 @@ def _fixed(words: str | None, rig: Rig) -> Mounted | None:
 
 
 def _read(
-    path: Path, options: Mapping[str, Any], rig: Rig, report: Report
+    path: Path,
+    options: Mapping[str, Any],
+    rig: Rig,
+    report: Report,
+    cache: Cache,
 ) -> tuple[TriangleMesh | RangedBody, Interest | None]:
     """Read what is to be measured, and which part of it is the user's own target."""
     report(f"reading {path}")
@@ -130,14 +180,16 @@ def _read(
         for line in ranges_lines(body):
             report(line)
         return body, None
-    mesh = load_mesh(path, unit=options["unit"], size_mm=options["size_mm"])
+    mesh = recalled_mesh(path, cache, unit=options["unit"], size_mm=options["size_mm"])
     interest, chosen = _interest(options, mesh)
     for line in (*size_lines(mesh), *optics_lines(rig, mesh), *chosen):
         report(line)
     return mesh, interest
 
 
-def _family(options: Mapping[str, Any], rig: Rig, report: Report) -> list[TriangleMesh]:
+def _family(
+    options: Mapping[str, Any], rig: Rig, report: Report, cache: Cache
+) -> list[TriangleMesh]:
     """Read the meshes of a family, and say what each is."""
     for name in ("select", "weight"):
         if options[name] is not None:
@@ -145,7 +197,9 @@ def _family(options: Mapping[str, Any], rig: Rig, report: Report) -> list[Triang
     meshes: list[TriangleMesh] = []
     for path in options["meshes"]:
         report(f"reading {path}")
-        meshes.append(load_mesh(path, unit=options["unit"]))
+        meshes.append(
+            recalled_mesh(Path(path), cache, unit=options["unit"], size_mm=None)
+        )
         for line in size_lines(meshes[-1]):
             report(line)
     for line in optics_lines(rig, TriangleMesh.joined(meshes)):

@@ -1,12 +1,14 @@
 """`plan_rig` and `sweep` as a designer calls them, in scripts and notebooks."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import wraps
 from itertools import product
 from typing import Any, ParamSpec
 
 from geometry.mesh.mesh import TriangleMesh
 from planning import pipeline
+from planning.cache.cache import Cache
 from planning.model.errors import InfeasibleLimitsError, InputError
 from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
 from planning.model.progress import Report
@@ -41,6 +43,37 @@ def _handing(planned: Callable[_Options, RigPlan]) -> Callable[_Options, HandedP
 plan_rig = _handing(pipeline.plan_rig)
 
 
+@dataclass(frozen=True, eq=False)
+class Planner:
+    """A mesh and a rig that are planned again and again, from `prepare`."""
+
+    mesh: TriangleMesh | RangedBody
+    rig: Rig
+    cache: Cache
+
+    def plan(self, **asked: Any) -> HandedPlan:  # noqa: ANN401
+        """Return what `plan_rig` does, with its options.
+
+        What doesn't hang on those that changed is known from before.
+        """
+        options: dict[str, Any] = {"cache": self.cache, **asked}
+        return plan_rig(self.mesh, self.rig, **options)
+
+
+def prepare(
+    mesh: TriangleMesh | RangedBody, rig: Rig, *, cache: Cache | None = None
+) -> Planner:
+    """Return what plans one mesh with one rig for requirements that change.
+
+    Args:
+        mesh: As of `plan_rig`.
+        rig: The rig.
+        cache: What was answered before; None: one in memory. With `Cache.on_disk()`
+            what the command line left is used, too, and the other way round.
+    """
+    return Planner(mesh, rig, cache or Cache.in_memory())
+
+
 def sweep(
     mesh: TriangleMesh | RangedBody,
     rig: Rig,
@@ -68,6 +101,7 @@ def sweep(
         InputError: If a setting is none of the rig file's.
     """
     rows: list[Row] = []
+    asked = {"cache": Cache.in_memory(), **asked}
     for values in product(*grid.values()):
         settings = dict(zip(grid, values, strict=True))
         options = {k: v for k, v in settings.items() if _DOT not in k}

@@ -84,7 +84,12 @@ class CandidateSet:
         cls, scene: Scene, samples: Target, projectors: tuple[PlannedProjector, ...]
     ) -> "CandidateSet":
         """Return what poses light; those of existing projectors come first."""
-        stages = lit_stages(scene, projectors, samples)
+        limits = scene.requirements.projector
+        stages = scene.cache.recall(
+            "lit_stages",
+            (scene.mesh, scene.bodies, limits, projectors, samples),
+            lambda: lit_stages(scene, projectors, samples),
+        )
         n_existing = len(scene.requirements.existing_of("projector"))
         return cls(scene, samples, projectors, stages, n_existing)
 

@@ -26,6 +26,8 @@ _STAGES = {
 # Before that it is too early to say how long the rest takes [percent].
 _EARLY = 10
 _PAIR = "pixels: pair "
+# What stays above the bar.
+_TOLD = "written", "changed"
 
 
 class LiveBar:
@@ -59,7 +61,7 @@ class LiveBar:
         elif line.startswith(_PAIR):
             self._pair(line)
             return
-        elif self._stage.startswith("reading") or line.startswith("written"):
+        elif self._stage.startswith("reading") or line.startswith(_TOLD):
             self._progress.console.print(f"plan: {line}", markup=False, highlight=False)
         self._show(self._done)
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from geometry.mesh.mesh import TriangleMesh
 from geometry.parallel import n_threads
 from geometry.regions.regions import DominantRegions
+from planning.cache.cache import NO_CACHE, Cache
 from planning.cameras.proved_cameras import CameraStage
 from planning.model.document.certificates import CamerasBy
 from planning.model.document.family_records import AlignedBy, AlignmentRecord
@@ -63,6 +64,7 @@ class PlanRequest:
         axis_wanted: Where ring axes stand after all; None: as was asked.
         least_projectors: Projectors at least, though fewer light enough.
         family: The members, of which the mesh holds all; None: it is one mesh.
+        cache: What was answered before.
     """
 
     mesh: TriangleMesh
@@ -80,6 +82,7 @@ class PlanRequest:
     axis_wanted: RingAxis | None = None
     least_projectors: int = 0
     family: FamilyRequest | None = None
+    cache: Cache = NO_CACHE
 
     @property
     def ring_axis(self) -> RingAxis | None:

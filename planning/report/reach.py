@@ -14,9 +14,20 @@ from planning.scene.scene import Scene
 
 
 def furthest_lit(
-    scene: Scene, projectors: Iterable[PlannedProjector], target: Target
+    scene: Scene, projectors: Sequence[PlannedProjector], target: Target
 ) -> NDArray[np.int8]:
     """Return how far samples come over all projectors: index in `CAUSES`, or `LIT`."""
+    limits = scene.requirements.projector
+    return scene.cache.recall(
+        "furthest_lit",
+        (scene.mesh, scene.bodies, limits, projectors, target),
+        lambda: _furthest_lit(scene, projectors, target),
+    )
+
+
+def _furthest_lit(
+    scene: Scene, projectors: Sequence[PlannedProjector], target: Target
+) -> NDArray[np.int8]:
     furthest = np.zeros(len(target), dtype=np.int8)
     for projector in projectors:
         pending = np.flatnonzero(furthest < LIT)

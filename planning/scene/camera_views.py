@@ -5,12 +5,15 @@ Views don't depend on the projectors, so they are kept while ring axes turn.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.cache.content import content
 from planning.model.planned import PlannedCamera
 from planning.scene.limits.camera_limits import ViewedSamples
+from solvers.bit_rows import pack_rows, unpack_rows
 
 from . import measurability
 from .placed_bodies import blocked_by
@@ -82,6 +85,14 @@ class CandidateViews:
         self._known: list[tuple[NDArray[np.float64], tuple[CameraView, ...]]] = []
         self._first: CandidateViews | None = None
 
+    @cached_property
+    def content(self) -> str:
+        """A hash of the cameras and of all that their views depend on."""
+        scene = self._scene
+        return content(
+            self.cameras, scene.mesh, scene.requirements.camera, scene.bodies
+        )
+
     def joined(self, more: Sequence[PlannedCamera]) -> "CandidateViews":
         """Return the views of these cameras, then of more; what is known is kept."""
         both = CandidateViews(self._scene, (*self.cameras, *more))
@@ -95,10 +106,26 @@ class CandidateViews:
             if np.array_equal(known, points):
                 return views
         first = () if self._first is None else self._first.on(target)
-        rest = self.cameras[len(first) :]
-        views = first + (camera_views(self._scene, rest, target) if rest else ())
+        views = first + self.added_on(target)
         self._known.append((points, views))
         return views
+
+    def added_on(self, target: Target) -> tuple[CameraView, ...]:
+        """Return what the cameras see that `joined` added; without it, all."""
+        added = self.cameras[0 if self._first is None else len(self._first.cameras) :]
+        return camera_views(self._scene, added, target) if added else ()
+
+    def seen(self, target: Target) -> NDArray[np.bool_]:
+        """Return which sample (row) each camera (column) sees, shape (n, m)."""
+
+        def answer() -> NDArray[np.uint64]:
+            seen = np.zeros((len(target), len(self.cameras)), dtype=bool)
+            for column, view in enumerate(self.on(target)):
+                seen[view.samples, column] = True
+            return pack_rows(seen)
+
+        rows = self._scene.cache.recall("seen", (self, target), answer)
+        return unpack_rows(rows, len(self.cameras))
 
 
 def _facing(

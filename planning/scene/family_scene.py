@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples
+from planning.cache.content import content
 
 from .draws import Draw
 from .occlusion import Occlusion
@@ -57,8 +58,15 @@ class FamilyScene(Scene):
             first.check_cancelled,
             first.placed,
             first.obstructions,
+            first.cache,
             members=tuple(members),
         )
+
+    @cached_property
+    def content(self) -> str:
+        """A hash of all that answers about the family depend on."""
+        sizes = [len(member.mesh.faces) for member in self.members]
+        return content(super().content, sizes, self.by_member)
 
     @property
     def surfaces(self) -> tuple[Scene, ...]:

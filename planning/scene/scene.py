@@ -13,8 +13,15 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import sample_surface
 from geometry.rays.visibility import Visibility
 from geometry.repair.hollow import MeshShell, measure_shell
+from planning.cache.cache import NO_CACHE, Cache
+from planning.cache.content import content
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.model.requirements import Requirements, Workspace
+from planning.model.requirements import (
+    CameraLimits,
+    CheckLimits,
+    Requirements,
+    Workspace,
+)
 from planning.scene.workspace.candidates import Candidates
 from planning.scene.workspace.model_candidates import ModelCandidates
 from planning.scene.workspace.view_tiles import Site
@@ -53,6 +60,7 @@ class Scene:
         check_cancelled: Called between pieces of work; raises when the run is cut.
         placed: Bodies of devices that were chosen, beside those that stand already.
         obstructions: What stands about the object and isn't a device.
+        cache: What was answered before about a scene of the same content.
     """
 
     mesh: TriangleMesh
@@ -64,6 +72,17 @@ class Scene:
     check_cancelled: Callable[[], None] = lambda: None
     placed: tuple[PlacedBody, ...] = ()
     obstructions: tuple[Obstruction, ...] = ()
+    cache: Cache = NO_CACHE
+
+    @cached_property
+    def content(self) -> str:
+        """A hash of all that answers about the scene depend on."""
+        stands = self.requirements, self.placed, self.obstructions
+        return content(self.mesh, self._regions_content, self.seed, *stands)
+
+    @cached_property
+    def _regions_content(self) -> str:
+        return content(self.region, self.steep)
 
     @cached_property
     def bodies(self) -> tuple[Blocker, ...]:
@@ -97,6 +116,24 @@ class Scene:
             return self
         return self._with(requirements=replace(self.requirements, region_coverage=0.0))
 
+    @cached_property
+    def for_light(self) -> "Scene":
+        """The scene as projectors know it: whatever is asked of cameras alone."""
+        required = self.requirements
+        pairs = replace(required.triangulation, max_sigma_m=None, accuracy_of="total")
+        return self._with(
+            requirements=replace(
+                required,
+                coverage=1.0,
+                max_cameras=None,
+                min_reachable=0.0,
+                min_views=None,
+                camera=CameraLimits(0.0),
+                triangulation=pairs,
+                check=CheckLimits(*(0.0,) * 6),
+            )
+        )
+
     def within(self, workspace: Workspace) -> "Scene":
         """Return the scene with another workspace."""
         return self._with(requirements=replace(self.requirements, workspace=workspace))
@@ -117,6 +154,8 @@ class Scene:
     def _carry(self, other: "Scene") -> None:
         """Hand on what rays are cast against: it is the same mesh."""
         other.__dict__["visibility"] = self.visibility
+        if self.cache.entries is not None:
+            other.__dict__["_regions_content"] = self._regions_content
 
     @cached_property
     def safe_workspace(self) -> Workspace:
@@ -136,7 +175,11 @@ class Scene:
     @cached_property
     def shell(self) -> MeshShell:
         """Whether the mesh is hollow, and what of it lies inside."""
-        return measure_shell(self.visibility.caster)
+        return self.cache.recall(
+            "measure_shell",
+            (self.mesh,),
+            lambda: measure_shell(self.visibility.caster),
+        )
 
     @cached_property
     def target_faces(self) -> NDArray[np.bool_]:

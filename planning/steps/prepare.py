@@ -13,6 +13,7 @@ from geometry.mesh.bearing import bearing
 from geometry.mesh.mesh import TriangleMesh
 from geometry.regions.regions import DominantRegions, dominant_regions
 from geometry.regions.selected_regions import regions_of_faces
+from planning.cache.cache import NO_CACHE, Cache
 from planning.cameras.camera_cover import camera_candidate_views
 from planning.model.device_poses import moved_to
 from planning.model.errors import InputError
@@ -47,6 +48,7 @@ def request_of(
     weight: Weight | None,
     align: AlignedBy = "given",
     family_quantile: float = 1.0,
+    cache: Cache = NO_CACHE,
 ) -> PlanRequest:
     """Return what is asked, of a surface whose long edges are cut.
 
@@ -70,7 +72,7 @@ def request_of(
         meshes = tuple(_cut(one, clock)[0] for one in family.meshes)
         family = replace(family, meshes=meshes)
         together = TriangleMesh.joined(meshes)
-        return PlanRequest(together, rig, wishes, family=family)
+        return PlanRequest(together, rig, wishes, family=family, cache=cache)
     if family_quantile != 1.0 or align != "given":
         raise InputError(
             "align and family_quantile are of several meshes on one rig, and there is "
@@ -83,7 +85,7 @@ def request_of(
     cut, parent = _cut(surface, clock)
     if interest is not None:
         interest = interest.on_parts(parent)
-    return PlanRequest(cut, rig, wishes, interest=interest, ranges=ranges)
+    return PlanRequest(cut, rig, wishes, interest=interest, ranges=ranges, cache=cache)
 
 
 def _cut(
@@ -172,7 +174,9 @@ def prepared_for(
     mesh, rig = request.mesh, request.rig
     obstacles = rig.obstacles(requirements.workspace, mesh)
     with clock.stage("regions", "curvature and dominant regions"):
-        field = principal_curvatures(mesh)
+        field = request.cache.recall(
+            "principal_curvatures", (mesh,), lambda: principal_curvatures(mesh)
+        )
         regions = _regions(request, field)
         clock.say(f"  {len(regions)} regions, {regions.dominant_share:.1%} of the area")
     scene = Scene(
@@ -184,6 +188,7 @@ def prepared_for(
         request.threads,
         clock.check,
         obstructions=Obstruction.about(mesh, obstacles, request.threads),
+        cache=request.cache,
     )
     code = rig.table.dense.code() if requirements.pattern == "dense" else None
     templates = tuple(
@@ -221,7 +226,11 @@ def _regions(request: PlanRequest, field: CurvatureField) -> DominantRegions:
     """The user's selection, or else the most curved surface."""
     if request.interest is not None:
         return regions_of_faces(request.mesh, field, request.interest.chosen)
-    regions = dominant_regions(request.mesh, field)
+    regions = request.cache.recall(
+        "dominant_regions",
+        (request.mesh,),
+        lambda: dominant_regions(request.mesh, field),
+    )
     if request.wishes.target != "surface" and not len(regions):
         raise InputError(
             "no dominant region: the surface is flat where its curvature can be "

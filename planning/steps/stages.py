@@ -19,10 +19,7 @@ from planning.model.errors import InfeasibleLimitsError
 from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
 from planning.projectors.candidate_set import NothingLitError
-from planning.projectors.exposures import with_exposures
-from planning.projectors.projector_poses import widen_margins
-from planning.projectors.projector_stage import ProjectorStage, plan_projectors
-from planning.projectors.proved_projectors import prove_fewest
+from planning.projectors.projector_stage import ProjectorStage
 from planning.proofs import camera_bound, projector_bound
 from planning.proofs.candidate_certificate import larger
 from planning.report.advice.camera_relaxations import nothing_measured
@@ -32,6 +29,8 @@ from planning.report.advice.what_helps import falls_short
 from planning.report.partial_plan import PartialPlan, Prepared
 from planning.report.region_claims import below_floor
 from planning.rings.acquisition import pixels_read
+
+from .recalled import fewest_projectors, proved_projectors, widened_projectors
 
 
 def first_projectors(ready: Prepared, clock: Stopwatch) -> ProjectorStage:
@@ -43,7 +42,7 @@ def first_projectors(ready: Prepared, clock: Stopwatch) -> ProjectorStage:
     n_poses = ready.request.rig.n_projector_poses
     with clock.stage("projectors", "projectors: candidates and cover"):
         try:
-            stage = plan_projectors(ready.scene, ready.templates, n_poses)
+            stage = fewest_projectors(ready.scene, ready.templates, n_poses)
         except NothingLitError as error:
             helps = nothing_lit(ready.scene, error)
             helps += standing_inside(ready.scene, error.candidates.projectors)
@@ -59,7 +58,7 @@ def bounded_projectors(
     prove = ready.request.prove
     with clock.stage("bounds", "bounds over all poses of the workspace"):
         effort = projector_bound.PROVE if prove else projector_bound.DEFAULT
-        stage = prove_fewest(ready.scene, stage, ready.templates, effort)
+        stage = proved_projectors(ready.scene, stage, ready.templates, effort)
         clock.say(f"  projectors: {_bound_words(stage.certificate)}")
     more, allowed = stage, ready.scene.requirements.max_projectors
     while more and len(more.projectors) < ready.request.least_projectors:
@@ -91,8 +90,7 @@ def placed(
     """
     request = ready.request
     with clock.stage("projector_poses", "projector poses: widest margins"):
-        projectors = widen_margins(ready.scene, stage)
-        projectors = with_exposures(ready.scene, projectors)
+        projectors = widened_projectors(ready.scene, stage)
     with clock.stage("cameras", "cameras: candidates, measurability and cover"):
         scene = ready.scene.among(projectors)
         views = camera_candidate_views(scene, ready.cameras, request.rig.n_camera_poses)

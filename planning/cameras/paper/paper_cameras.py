@@ -162,7 +162,7 @@ def route_among(
         )
     joined, by_count = _joined(candidates, route, n_fixed(scene))
     n = len(candidates.cameras)
-    views = joined.on(samples.target)[n:]
+    views = joined.added_on(samples.target)
     passed = measured_by(scene, joined.cameras[n:], samples, views)
     return _judged(
         scene,

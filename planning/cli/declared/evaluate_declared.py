@@ -23,6 +23,7 @@ _OF_PLANS = {
     "robust": None,
     "prove": False,
     "cameras_by": "both",
+    "watch": None,
 }
 
 

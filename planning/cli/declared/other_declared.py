@@ -1,4 +1,4 @@
-"""`plan verify`, `accept`, `show`, `report` and `sample`: their options."""
+"""`plan verify`, `accept`, `show`, `report`, `cache` and `sample`: their options."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -143,6 +143,16 @@ def report(**options: Any) -> None:  # noqa: ANN401
     from planning.cli.show_command import report_command
 
     run(lambda: report_command(options), debug=options["debug"])
+
+
+@click.command()
+@click.argument("clear", type=click.Choice(["clear"]), required=False)
+@debug_option
+def cache(clear: str | None, debug: bool) -> None:
+    """Say where earlier runs left what later ones use, and its size; or clear it."""
+    from planning.cli.other_commands import cache_command
+
+    run(lambda: cache_command(clear=clear is not None), debug=debug)
 
 
 @click.command()

@@ -100,6 +100,23 @@ def check_projectors(options: dict[str, Any]) -> None:
         )
 
 
+def check_watch(options: dict[str, Any]) -> None:
+    """Take the rig file to watch for the rig.
+
+    Raises:
+        click.UsageError: If there is another, no file, or one JSON object is wanted.
+    """
+    if options["rig_name"] != "default":
+        raise click.UsageError("give --rig or --watch, not both")
+    if options["as_json"]:
+        raise click.UsageError("--json is of one plan, and --watch makes several")
+    if not os.path.isfile(options["watch"]):
+        raise click.UsageError(
+            f"--watch {options['watch']!r} isn't a file; `plan rigs new` writes one"
+        )
+    options["rig_name"] = options["watch"]
+
+
 def _check_without_rings(options: dict[str, Any]) -> None:
     """Refuse what is said of rings where there are none, and what isn't built."""
     pattern = options["pattern"]

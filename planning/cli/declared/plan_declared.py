@@ -14,7 +14,7 @@ from planning.cli.console import (
     threads_option,
 )
 
-from .plan_checks import check_options, check_projectors
+from .plan_checks import check_options, check_projectors, check_watch
 from .survival_options import survival_options
 
 # What `plan --help` puts together; an option of none of these is told last.
@@ -25,7 +25,7 @@ _GROUPS = {
     ),
     "With what, and where": (
         *("max_projectors", "max_cameras", "max_heads"),
-        *("rig_name", "light", "pattern"),
+        *("rig_name", "watch", "light", "pattern"),
         *("ring_axis", "fixed", "poses"),
     ),
     "How well": (
@@ -34,6 +34,7 @@ _GROUPS = {
     ),
     "How it is sought": (
         *("cameras_by", "joint", "prove", "seed", "time_limit", "threads", "no_check"),
+        "no_cache",
     ),
     "Output": (
         *("output", "no_patterns", "no_report"),
@@ -143,6 +144,12 @@ class GroupedCommand(click.Command):
     default="default",
     metavar="NAME|rig.toml",
     help="Devices and limits.",
+)
+@click.option(
+    "--watch",
+    metavar="rig.toml",
+    help="Instead of --rig: plan, and plan again whenever this file or the mesh is "
+    "saved, telling what changed, until Ctrl-C.",
 )
 @click.option(
     "--light",
@@ -258,6 +265,11 @@ class GroupedCommand(click.Command):
 @threads_option
 @click.option("--prove", is_flag=True, help="Spend more work on the continuous bounds.")
 @click.option("--no-check", is_flag=True, help="Skip the check from pixels.")
+@click.option(
+    "--no-cache",
+    is_flag=True,
+    help="Compute all anew; else what an earlier run left is used (`plan cache`).",
+)
 @click.option("--no-patterns", is_flag=True, help="Write no pattern images.")
 @click.option(
     "--verbose",
@@ -272,4 +284,7 @@ def rig_command(**options: Any) -> None:  # noqa: ANN401
 
     check_options(options)
     check_projectors(options)
+    if options["watch"] is not None:
+        check_watch(options)
+        from planning.cli.watch_command import watch_command as plan_command
     run(lambda: plan_command(options, sys.argv[1:]), debug=options["debug"])

@@ -176,10 +176,19 @@ def _inside(camera: PlannedCamera, frame: Array, turns: Array) -> Mask:
     return inside
 
 
-def are_normals(normals: Array, meeting: Array, mesh: TriangleMesh) -> bool:
-    """Return whether both normals (2, 3) are those of faces beside E."""
+def faces_reach(mesh: TriangleMesh) -> Array:
+    """Return how far the farthest corner of each face is from its centroid, (n_f,)."""
     arms = mesh.corners - mesh.face_centroids[:, None]
-    reach = np.linalg.norm(arms, axis=2).max(axis=1)
+    return np.linalg.norm(arms, axis=2).max(axis=1)
+
+
+def are_normals(
+    normals: Array, meeting: Array, mesh: TriangleMesh, reach: Array
+) -> bool:
+    """Return whether both normals (2, 3) are those of faces beside E.
+
+    `reach` is that of the faces.
+    """
     apart = np.linalg.norm(mesh.face_centroids - meeting, axis=1)
     beside = mesh.face_normals[apart <= reach + _BESIDE * mesh.radius]
     return all(

@@ -2,13 +2,18 @@
 
 import numpy as np
 
-from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.proximity import closest_points
 from planning.model.document.device_records import BaselineRow
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 
-from .audit_seams import SeamPlane, are_normals, is_onward, section_of
+from .audit_seams import (
+    SeamPlane,
+    are_normals,
+    faces_reach,
+    is_onward,
+    section_of,
+)
 
 # Room for lengths and angles written with a few digits, and for E among them.
 _LENGTH_M = 5e-5
@@ -21,6 +26,7 @@ def audit_baselines(case: AuditCase, findings: AuditFindings) -> None:
     cameras = {camera.id: camera for camera in case.plan.cameras}
     rows = case.plan.document.baselines
     pairs = [row.cameras for row in rows]
+    sections: list[tuple[BaselineRow, SeamPlane]] = []
     for place, (row, pair) in enumerate(zip(rows, pairs, strict=True)):
         key = f"baselines.{place}.cameras"
         if len(set(pair)) != 2 or not set(pair) <= set(cameras):
@@ -34,24 +40,34 @@ def audit_baselines(case: AuditCase, findings: AuditFindings) -> None:
             "baselines",
             f"has {first}, {second} but not the order {second}, {first}",
         )
-        section = section_of(row, cameras)
-        below = findings.at(f"baselines.{first}-{second}")
-        if _audit_seam(row, section, case.plan.surface.mesh, below):
-            largest = case.plan.requirements.camera.max_incidence
+        sections.append((row, section_of(row, cameras)))
+    mesh, largest = case.plan.surface.mesh, case.plan.requirements.camera.max_incidence
+    # All at once: a large mesh takes long to be made ready for it.
+    meeting = np.reshape([section.meeting for _, section in sections], (-1, 3))
+    apart = np.abs(closest_points(mesh, meeting).distances).tolist()
+    reach = faces_reach(mesh)
+    for (row, section), apart_m in zip(sections, apart, strict=True):
+        below = findings.at(f"baselines.{'-'.join(row.cameras)}")
+        beside = are_normals(section.normals, section.meeting, mesh, reach)
+        if _audit_seam(row, section, apart_m, below, beside=beside):
             _audit_row(row, section, largest, below)
             _audit_limit(row, section, largest, below)
 
 
 def _audit_seam(
-    row: BaselineRow, section: SeamPlane, mesh: TriangleMesh, findings: AuditFindings
+    row: BaselineRow,
+    section: SeamPlane,
+    apart_m: float,
+    findings: AuditFindings,
+    *,
+    beside: bool,
 ) -> bool:
     """Check E and the directions there; return whether these hold."""
-    apart = float(abs(closest_points(mesh, section.meeting[None]).distances[0]))
     findings.holds(
-        apart <= _LENGTH_M, "E", f"lies {1e3 * apart:.3g} mm off the surface"
+        apart_m <= _LENGTH_M, "E", f"lies {1e3 * apart_m:.3g} mm off the surface"
     )
     return findings.holds(
-        are_normals(section.normals, section.meeting, mesh),
+        beside,
         "normals",
         f"{row.normals!r} must be two normals of the surface",
     ) and findings.holds(

@@ -1,0 +1,1 @@
+"""What was computed before and depends on nothing that has changed."""
