@@ -90,6 +90,20 @@ def sample_command(output: Path, faces: int, variant: int | None) -> int:
     return 0
 
 
+def sample_family_command(folder: Path, faces: int, count: int, seed: int) -> int:
+    """Write a family of heads, from child to adult."""
+    folder.mkdir(parents=True, exist_ok=True)
+    digits = max(2, len(str(count)))
+    for member in range(count):
+        path = folder / f"head-{member + 1:0{digits}}.obj"
+        write_sample(path, shape=HeadShape.of_family(seed, member), n_faces=faces)
+    click.echo(
+        f"wrote {folder}: {count_words(count, 'head')} in millimetres, from child to "
+        f"adult; `plan --mesh {folder} --max-projectors 5` plans one rig for all"
+    )
+    return 0
+
+
 def cache_command(*, clear: bool) -> int:
     """Say where the cache is and what it holds, or drop it."""
     folder = cache_folder()

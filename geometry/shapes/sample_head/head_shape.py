@@ -7,6 +7,21 @@ import numpy as np
 
 from geometry.mesh.mesh import MeshError
 
+# A child of about five beside an adult: all lengths, and beyond that these. Assumed for
+# a population to plan for, and no survey's.
+_CHILD_SCALE = 0.88
+_CHILD = {
+    "crown_height": 1.04,
+    "face_length": 0.88,
+    "jaw_width": 0.94,
+    "brow_ridge": 0.4,
+    "nose_length": 0.86,
+    "nose_projection": 0.8,
+    "mouth_width": 0.92,
+    "ear_height": 0.95,
+    "neck_width": 0.86,
+}
+
 
 def _length(default: float, least: float, largest: float, deviation: float) -> float:
     """A proportion in [mm]: where it is a head's, and its spread as surveys have it."""
@@ -79,12 +94,28 @@ class HeadShape:
     @classmethod
     def random(cls, seed: int) -> "HeadShape":
         """Return one head of a population: normal, cut off at 2.5 deviations."""
-        rng = np.random.default_rng(seed)
+        return cls._drawn(np.random.default_rng(seed), 1.0)
+
+    @classmethod
+    def of_family(cls, seed: int, member: int) -> "HeadShape":
+        """Return a member of a family from child to adult, whatever others there are.
+
+        How grown up it is is uniform; proportions are then normal about that age's.
+        """
+        rng = np.random.default_rng([seed, member])
+        return cls._drawn(rng, float(rng.random()))
+
+    @classmethod
+    def _drawn(cls, rng: np.random.Generator, grown: float) -> "HeadShape":
+        """A head of an age, 0 a child's and 1 an adult's."""
         proportions = fields(cls)
         draws = np.clip(rng.standard_normal(len(proportions)), -2.5, 2.5)
         values: dict[str, float] = {}
         for proportion, draw in zip(proportions, draws, strict=True):
             least, largest = proportion.metadata["limits"]
-            value = proportion.default + proportion.metadata["deviation"] * float(draw)
+            share = grown + (1.0 - grown) * _CHILD.get(proportion.name, 1.0)
+            middle = share * float(getattr(cls, proportion.name))
+            value = middle + proportion.metadata["deviation"] * float(draw)
             values[proportion.name] = min(max(value, least), largest)
+        values["scale"] = grown + (1.0 - grown) * _CHILD_SCALE
         return cls(**values)

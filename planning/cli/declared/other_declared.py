@@ -160,9 +160,21 @@ def cache(clear: str | None, debug: bool) -> None:
     "-o",
     "--output",
     type=click.Path(path_type=Path),
-    default="face.obj",
-    metavar="FILE",
-    help="Where it goes.",
+    metavar="FILE|DIR",
+    help="Where it goes [default: face.obj; of a family ./heads].",
+)
+@click.option(
+    "--family",
+    type=click.IntRange(1, 1000),
+    metavar="N",
+    help="Instead, so many heads from child to adult, in a folder.",
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(0),
+    metavar="S",
+    default=0,
+    help="Of the family's draws.",
 )
 @click.option(
     "--faces",
@@ -178,8 +190,22 @@ def cache(clear: str | None, debug: bool) -> None:
     help="Another head of the population [default: the mean head].",
 )
 @debug_option
-def sample(output: Path, faces: int, variant: int | None, debug: bool) -> None:
-    """Write the sample head, an OBJ file in millimetres."""
-    from planning.cli.other_commands import sample_command
+def sample(
+    output: Path | None,
+    family: int | None,
+    seed: int,
+    faces: int,
+    variant: int | None,
+    debug: bool,
+) -> None:
+    """Write the sample head, an OBJ file in millimetres, or a family of heads."""
+    from planning.cli.other_commands import sample_command, sample_family_command
 
-    run(lambda: sample_command(output, faces, variant), debug=debug)
+    if family is None:
+        head = output or Path("face.obj")
+        run(lambda: sample_command(head, faces, variant), debug=debug)
+        return
+    if variant is not None:
+        raise click.UsageError("give --family or --variant, not both")
+    folder = output or Path("heads")
+    run(lambda: sample_family_command(folder, faces, family, seed), debug=debug)

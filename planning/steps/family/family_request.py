@@ -3,8 +3,7 @@
 import re
 from collections.abc import Sequence
 
-import numpy as np
-
+from geometry.alignment.alignment import aligned
 from geometry.mesh.mesh import TriangleMesh
 from planning.model.document.family_records import AlignedBy, AlignmentRecord
 from planning.model.errors import InputError
@@ -22,7 +21,6 @@ def family_of(
 
     Raises:
         InputError: If the share is none.
-        MeshError: If a mesh can't be laid over the first.
     """
     if not 0.0 < quantile <= 1.0:
         raise InputError(
@@ -30,8 +28,23 @@ def family_of(
             f"the members that the rig must serve"
         )
     names = member_names([mesh.source.path if mesh.source else "" for mesh in meshes])
-    stands = AlignmentRecord.model_validate({"world_from_file": np.eye(4).tolist()})
-    return FamilyRequest(names, tuple(meshes), (stands,) * len(meshes), align, quantile)
+    placed = aligned(meshes, align)
+    return FamilyRequest(
+        names,
+        tuple(one.mesh for one in placed),
+        tuple(
+            AlignmentRecord.model_validate(
+                {
+                    "world_from_file": one.world_from_file.tolist(),
+                    "rms_before_m": one.rms_before_m,
+                    "rms_m": one.rms_m,
+                }
+            )
+            for one in placed
+        ),
+        align,
+        quantile,
+    )
 
 
 def member_names(paths: Sequence[str]) -> tuple[str, ...]:

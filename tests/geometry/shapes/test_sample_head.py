@@ -298,3 +298,15 @@ def _face_normal(corners, grid):
     faces = geodesic_grid(1).faces
     centres = corners[faces].sum(axis=1)
     return (centres / np.linalg.norm(centres, axis=1, keepdims=True)).T
+
+
+def test_a_family_is_from_child_to_adult_whatever_its_size():
+    family = [HeadShape.of_family(3, k) for k in range(40)]
+    assert family[7] == HeadShape.of_family(3, 7)
+    assert family[7] != HeadShape.of_family(4, 7)
+    scales = np.array([shape.scale for shape in family])
+    assert scales.min() < 0.91
+    assert scales.max() > 0.97
+    # A child's nose stands out less, beyond its size: the correlation shows.
+    noses = np.array([shape.nose_projection for shape in family])
+    assert np.corrcoef(scales, noses)[0, 1] > 0.4

@@ -1,0 +1,1 @@
+"""Meshes laid over each other."""
