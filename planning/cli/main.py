@@ -12,6 +12,7 @@ from typing import NoReturn
 import click
 from click.shell_completion import CompletionItem, get_completion_class
 
+from planning.cli.declared.batch_declared import batch
 from planning.cli.declared.calibrate_declared import calibrate
 from planning.cli.declared.evaluate_declared import evaluate
 from planning.cli.declared.export_declared import export
@@ -90,6 +91,9 @@ def commands() -> None:
 
     \b
     plan --mesh face.obj --max-projectors 3   plans, checks, writes ./face-plan/
+    plan --mesh heads/ --max-projectors 5     one rig for all of a folder's meshes
+    plan batch parts/ -o out/ --max-projectors 4
+                                              a plan for each of many parts
     plan evaluate face.obj --poses rig.csv    what a rig measures as it stands
     plan verify face-plan/plan.json           recomputes every claim, checks again
     plan accept face-plan/plan.json           a maker's figures: ball bars, plates
@@ -111,8 +115,8 @@ def commands() -> None:
 
 
 for _command in (
-    *(rig_command, evaluate, verify, accept, show, reconstruct, tolerance, export),
-    *(compare, report, lens, calibrate, play, rigs, schema, cache, sample),
+    *(rig_command, batch, evaluate, verify, accept, show, reconstruct, tolerance),
+    *(export, compare, report, lens, calibrate, play, rigs, schema, cache, sample),
 ):
     commands.add_command(_command)
 

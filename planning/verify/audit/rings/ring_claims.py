@@ -156,7 +156,7 @@ def _audit_idle(
 
     The object is where rays meet it and where the panel holds its vertices. The band of
     a ring reaches to its neighbours, and `rig.rings.margin_m` beyond at the standoff; a
-    row of the grid is left to rounding.
+    row of the grid is left to rounding. Rings of a family may light another member.
     """
     rig, projector = case.plan.document.rig, grid.projector
     margin = projector.light.coordinate_of(
@@ -173,7 +173,11 @@ def _audit_idle(
     lights = begin < np.searchsorted(places, edges[2:] + room, side="right")
     for wrong, key, words in (
         (hidden & lights, "left_out", "light the object and are left out"),
-        (~hidden & ~lights, "ring_radii", "light nothing of the object and are shown"),
+        (
+            ~hidden & ~lights & (not case.plan.of_member),
+            "ring_radii",
+            "light nothing of the object and are shown",
+        ),
     ):
         findings.holds(
             not wrong.any(),

@@ -1,0 +1,1 @@
+"""Many parts, one after the other or side by side."""

@@ -1,0 +1,174 @@
+"""What `plan batch` does."""
+
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, closing, suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import click
+
+from geometry.parallel import n_threads
+from planning.cache.content import code_content
+from planning.cli.console import print_json, reporter
+from planning.cli.output_folder import exchanged
+from planning.model.errors import InputError, PlanFileError
+from planning.model.progress import Report
+from planning.model.words import count_words
+
+from .index_page import NAME as INDEX
+from .index_page import write_index
+from .ledger import NAME, Row, asked_of, is_whole, read_rows, row_of, write_rows
+from .part_task import PartEnd, PartTask, stop_parts
+from .parts import Part, find_parts, part_files, rig_files
+from .runners import cluster, local
+
+_INTERRUPTED = 130
+
+
+@dataclass(eq=False)
+class _Batch:
+    """Parts, and what became of those that ended.
+
+    Attributes:
+        threads: Of each part's process.
+        asked: Hash of all that each part's plan follows from.
+    """
+
+    parts: Mapping[str, Part]
+    out: Path
+    words: Sequence[str]
+    rig: Mapping[str, bytes]
+    report: Report
+    threads: int = 1
+    rows: dict[str, Row] = field(default_factory=dict[str, Row])
+    asked: dict[str, str] = field(default_factory=dict[str, str])
+
+    def task(self, part: Part) -> PartTask:
+        """Return what is planned of a part."""
+        files = part_files(part.path)
+        first, *others = files
+        # The plan tells a part by its name, and what it refers to lies beside it.
+        beside = Path(part.name).parent
+        named = {part.name: files[first]}
+        named |= {(beside / name).as_posix(): files[name] for name in others}
+        return PartTask(part.name, named, self.rig, self.words, self.threads)
+
+    def pending(self, *, again: bool) -> Iterator[PartTask]:
+        """Yield what isn't finished; tell what is, and what can't be read."""
+        before = {} if again else read_rows(self.out)
+        for part in self.parts.values():
+            try:
+                task = self.task(part)
+            except InputError as error:
+                self.end(PartEnd(part.name, error.exit_code, str(error), 0.0, {}))
+                continue
+            row = before.get(part.name)
+            asked = self.asked[part.name] = asked_of(task, code_content())
+            same = row is not None and (row.asked, row.folder) == (asked, part.folder)
+            if row is not None and same and is_whole(row, self.out):
+                self.rows[part.name] = row
+                self.report(f"{part.name}: {row.verdict}, from an earlier run")
+                continue
+            yield task
+
+    def end(self, end: PartEnd) -> None:
+        """Put what a part wrote in its place, and tell how it ended."""
+        part, asked = self.parts[end.name], self.asked.get(end.name, "")
+        if end.code in (0, 1):
+            with exchanged(_made(self.out / part.folder)) as fresh:
+                for name, content in end.files.items():
+                    path = fresh / name
+                    path.parent.mkdir(parents=True, exist_ok=True)
+                    path.write_bytes(content)
+        try:
+            row = row_of(end, part.folder, self.out, asked)
+        except PlanFileError as error:
+            # Whatever a worker sent: it is no plan.
+            row = row_of(replace(end, code=-1, message=str(error)), "", self.out, "")
+        self.rows[end.name] = row
+        self.write()
+        why = f": {row.message}" if row.failed and row.message else ""
+        n = f"{len(self.rows)} of {len(self.parts)}"
+        self.report(f"{end.name}: {row.verdict}{why} ({n})")
+
+    def write(self) -> None:
+        """Write the table and the page of what ended so far."""
+        write_rows(self.rows.values(), self.out)
+        write_index(list(self.rows.values()), self.out)
+
+
+def _made(folder: Path) -> Path:
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def batch_command(
+    options: Mapping[str, Any], given: Sequence[str], words: Sequence[str]
+) -> int:
+    """Plan every part that isn't finished; return 0 if all meet what is asked.
+
+    Args:
+        options: Of the command line.
+        given: Folders, patterns and files of the parts.
+        words: Options of each part's own command line.
+    """
+    parts = {part.name: part for part in find_parts(given)}
+    out = Path(options["output"])
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise click.UsageError(f"{out}: can't be written ({error.strerror})") from None
+    report = reporter(quiet=options["quiet"])
+    rig = rig_files(options["rig_name"])
+    jobs = options["jobs"] or max(1, n_threads() // 2)
+    batch = _Batch(parts, out, words, rig, report, max(1, n_threads() // jobs))
+    interrupted = False
+    with ExitStack() as stack:
+        if options["scheduler"] is None:
+            run = stack.enter_context(local(jobs))
+        else:
+            run, count = stack.enter_context(cluster(options["scheduler"]))
+            report(f"{options['scheduler']}: {count_words(count, 'worker')}")
+            batch.threads = options["threads"] or 1
+        if options["threads"]:
+            batch.threads = options["threads"]
+        with suppress(KeyboardInterrupt):
+            interrupted = True
+            with closing(run(batch.pending(again=options["again"]))) as ends:
+                for end in ends:
+                    batch.end(end)
+            interrupted = False
+        if interrupted:
+            stop_parts()
+    batch.write()
+    return _told(batch, options, interrupted=interrupted)
+
+
+def _told(batch: _Batch, options: Mapping[str, Any], *, interrupted: bool) -> int:
+    rows = sorted(batch.rows.values(), key=lambda row: row.part)
+    missed = [row for row in rows if row.exit == 1]
+    failed = [row for row in rows if row.failed]
+    if options["as_json"]:
+        print_json(
+            {
+                "parts": len(batch.parts),
+                "met": sum(row.exit == 0 for row in rows),
+                "missed": [row.part for row in missed],
+                "failed": {row.part: row.message for row in failed},
+                "files": [str(batch.out / NAME), str(batch.out / INDEX)],
+            }
+        )
+    else:
+        met = sum(row.exit == 0 for row in rows)
+        click.echo(f"{met} of {len(batch.parts)} parts are measured as asked")
+        for title, some in (("MISSED", missed), ("FAILED", failed)):
+            width = min(shutil.get_terminal_size().columns, 100)
+            for row in some:
+                line = f"{title}   {row.part}: {row.message}"
+                click.echo(line if len(line) <= width else f"{line[: width - 4]} ...")
+        click.echo(f"FILES    {batch.out}: {NAME}, {INDEX}, a folder for each part")
+    if interrupted:
+        return _INTERRUPTED
+    return 1 if missed or failed or len(rows) < len(batch.parts) else 0

@@ -1,0 +1,154 @@
+"""`batch.csv`: a line a part, which a later run knows finished parts by."""
+
+import csv
+import hashlib
+import io
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+
+from planning.model.errors import PlanFileError
+from planning.model.files import write_atomically
+from planning.model.plan import RigPlan
+from planning.report.summary.shortfall import missing
+
+from .part_task import PartEnd, PartTask
+
+NAME = "batch.csv"
+_VERDICTS = {0: "met", 1: "NOT MET", 130: "interrupted"}
+
+
+@dataclass(frozen=True)
+class Row:
+    """What became of a part; shares are of what can be reached, empty: no plan.
+
+    Attributes:
+        part: Its name.
+        folder: Of its plan.
+        exit: Of its run.
+        verdict: In a word or two.
+        projectors_least: Proved over the candidates; of cameras likewise.
+        lit: Share of what projectors can reach of the target.
+        measured: Share of what cameras can reach of what is lit.
+        of_target: Measured share of the whole target.
+        target_cm2: Its area.
+        rms_mm: Of the check from pixels.
+        seconds: Wall time of the run.
+        message: Why not, in a line.
+        asked: Hash of the mesh file and of everything that is asked.
+        digest: Of the plan (`RigPlan.digest`).
+    """
+
+    part: str
+    folder: str
+    exit: int
+    verdict: str
+    projectors: str = ""
+    projectors_least: str = ""
+    cameras: str = ""
+    cameras_least: str = ""
+    lit: str = ""
+    measured: str = ""
+    of_target: str = ""
+    target_cm2: str = ""
+    rms_mm: str = ""
+    seconds: str = ""
+    message: str = ""
+    asked: str = ""
+    digest: str = ""
+
+    @property
+    def failed(self) -> bool:
+        """Whether there is no plan, or one that wasn't made to its end."""
+        return self.exit not in (0, 1)
+
+
+def asked_of(task: PartTask, version: str) -> str:
+    """Return a hash of all that a part's plan follows from, hexadecimal."""
+    hashed = hashlib.sha256(json.dumps([version, *task.words]).encode())
+    for files in (task.mesh, task.rig):
+        for name, content in files.items():
+            hashed.update(f"{name}:{len(content)};".encode() + content)
+    return hashed.hexdigest()
+
+
+def row_of(end: PartEnd, folder: str, out: Path, asked: str) -> Row:
+    """Return the row of a part that ended, whose files stand in their folder."""
+    verdict = _VERDICTS.get(end.code, "failed")
+    row = Row(
+        end.name,
+        folder,
+        end.code,
+        verdict,
+        seconds=f"{end.seconds:.1f}",
+        message=end.message if end.code not in (0, 1) else "",
+        asked=asked,
+    )
+    if end.code not in (0, 1):
+        return row
+    plan = RigPlan.load(out / folder / "plan.json")
+    return _with_plan(row, plan)
+
+
+def _with_plan(row: Row, plan: RigPlan) -> Row:
+    areas, proofs = plan.coverage.target, plan.document.certificates
+    check, lights = plan.document.reconstruction, proofs.projectors
+    missed = [one.figure for one in missing(plan)]
+    if check is None and row.exit == 0:
+        row = replace(row, verdict="met, NOT CHECKED")
+    return replace(
+        row,
+        projectors=str(len(plan.projectors)),
+        projectors_least="" if lights is None else str(lights.candidates.lower_bound),
+        cameras=str(len(plan.cameras)),
+        cameras_least=str(proofs.cameras.candidates.lower_bound),
+        lit=_share(areas.lit_m2, areas.reachable_by_projectors_m2),
+        measured=_share(areas.measured_m2, areas.reachable_by_cameras_m2),
+        of_target=_share(areas.measured_m2, areas.area_m2),
+        target_cm2=f"{1e4 * areas.area_m2:.2f}",
+        rms_mm=""
+        if check is None or check.accuracy_rms_m is None
+        else f"{1e3 * check.accuracy_rms_m:.4f}",
+        message="; ".join(missed),
+        digest=plan.digest,
+    )
+
+
+def _share(part: float, whole: float) -> str:
+    return f"{part / whole:.4f}" if whole > 0.0 else ""
+
+
+def write_rows(rows: Iterable[Row], out: Path) -> None:
+    """Write the table whole, in the order of the parts' names."""
+    text = io.StringIO()
+    names = [field.name for field in fields(Row)]
+    table = csv.DictWriter(text, names, lineterminator="\n")
+    table.writeheader()
+    table.writerows(asdict(row) for row in sorted(rows, key=lambda row: row.part))
+    write_atomically(
+        out / NAME, lambda file: file.write(text.getvalue().encode("utf-8"))
+    )
+
+
+def read_rows(out: Path) -> Mapping[str, Row]:
+    """Return the rows of an earlier run by part; none where there was none."""
+    names = {field.name for field in fields(Row)}
+    rows: dict[str, Row] = {}
+    with suppress(OSError, UnicodeDecodeError, csv.Error, ValueError):
+        text = (out / NAME).read_text("utf-8")
+        for line in csv.DictReader(io.StringIO(text)):
+            if set(line) == names and all(v is not None for v in line.values()):
+                row = Row(**{**line, "exit": int(line["exit"])})  # type: ignore[arg-type]
+                rows[row.part] = row
+    return rows
+
+
+def is_whole(row: Row, out: Path, files: Sequence[str] = ("plan.json",)) -> bool:
+    """Return whether the plan that a row tells of stands whole in its folder."""
+    if row.failed:
+        return False
+    with suppress(PlanFileError, OSError):
+        return RigPlan.load(out / row.folder / files[0]).digest == row.digest
+    return False

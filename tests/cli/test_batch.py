@@ -1,0 +1,233 @@
+"""Many parts: which they are, what is kept of each, and how a batch goes on."""
+
+import csv
+import os
+import signal
+from dataclasses import replace
+
+import pytest
+from click.testing import CliRunner
+
+from planning.cli.batch import batch_command, part_task, runners
+from planning.cli.batch.ledger import is_whole, read_rows, row_of, write_rows
+from planning.cli.batch.part_task import PartEnd, PartTask, plan_part
+from planning.cli.batch.parts import find_parts, part_files, rig_files
+from planning.cli.main import commands
+from planning.cli.other_commands import write_sample
+from planning.model.errors import InputError
+
+RIG = """
+base = "default"
+name = "few candidates"
+[placement]
+n_candidate_projectors = 40
+n_candidate_cameras = 40
+n_reference_projectors = 600
+n_reference_cameras = 400
+"""
+FAST = ("--max-projectors", "5", "--cameras-by", "cover", "--no-check", "--no-patterns")
+
+
+def run(*words):
+    return CliRunner().invoke(commands, ["batch", *map(str, words)])
+
+
+def rows(out):
+    with (out / "batch.csv").open() as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    """Two parts, one of them broken, planned by the command itself."""
+    place = tmp_path_factory.mktemp("batch")
+    (place / "few.toml").write_text(RIG)
+    parts = place / "parts"
+    (parts / "sub").mkdir(parents=True)
+    write_sample(parts / "sub" / "head.obj", n_faces=1500)
+    (parts / "broken.stl").write_text("no mesh at all")
+    words = (parts, "-o", place / "out", "--rig", place / "few.toml", *FAST)
+    ended = run(*words, "--no-report")
+    assert ended.exit_code == 1, ended.stderr
+    return place, ended
+
+
+def test_every_part_is_told_and_the_others_are_planned(done):
+    place, ended = done
+    broken, head = rows(place / "out")
+    assert (broken["part"], broken["exit"], broken["verdict"]) == (
+        *("broken.stl", "3", "failed"),
+    )
+    assert "not a usable STL" in broken["message"]
+    assert (head["part"], head["folder"]) == ("sub/head.obj", "sub/head")
+    assert head["verdict"] == "met, NOT CHECKED"
+    assert float(head["measured"]) >= 0.95
+    assert int(head["cameras_least"]) <= int(head["cameras"])
+    assert "1 of 2 parts" in ended.stdout
+    assert "FAILED   broken.stl" in ended.stdout
+    page = (place / "out" / "index.html").read_text()
+    assert "sub/head.obj" in page
+    assert "http" not in page.split("</style>")[1]
+
+
+def test_a_part_is_called_by_its_place_in_the_batch(done):
+    place, _ = done
+    plan = (place / "out" / "sub" / "head" / "plan.json").read_text()
+    assert '"path": "sub/head.obj"' in plan
+    assert str(place) not in plan.replace("surface.npz", "")
+
+
+def _counted(monkeypatch):
+    begun = []
+
+    def planned(task):
+        begun.append(task.name)
+        return PartEnd(task.name, 3, "not again", 0.0, {})
+
+    monkeypatch.setattr(runners, "plan_part", planned)
+    return begun
+
+
+def test_a_later_run_leaves_what_is_finished(done, monkeypatch):
+    place, _ = done
+    begun = _counted(monkeypatch)
+    words = (place / "parts", "-o", place / "out", "--rig", place / "few.toml", *FAST)
+    ended = run(*words, "--no-report")
+    assert begun == ["broken.stl"]
+    assert "from an earlier run" in ended.stderr
+    assert "1 of 2 parts" in ended.stdout
+
+
+@pytest.mark.parametrize("how", ["option", "rig", "mesh", "again", "damaged"])
+def test_what_changed_is_planned_again(done, tmp_path, monkeypatch, how):
+    place, _ = done
+    begun = _counted(monkeypatch)
+    again = tmp_path / "copy"
+    os.system(f"cp -r '{place}' '{again}'")
+    words = [again / "parts", "-o", again / "out", "--rig", again / "few.toml", *FAST]
+    words.append("--no-report")
+    if how == "option":
+        words += ["--coverage", "0.9"]
+    elif how == "rig":
+        (again / "few.toml").write_text(RIG + "[limits]\nmax_sigma_mm = 0.4\n")
+    elif how == "mesh":
+        with (again / "parts" / "sub" / "head.obj").open("a") as file:
+            file.write("# another\n")
+    elif how == "again":
+        words.append("--again")
+    else:
+        (again / "out" / "sub" / "head" / "surface.npz").write_bytes(b"damaged")
+    run(*words)
+    assert sorted(begun) == ["broken.stl", "sub/head.obj"]
+
+
+def test_an_interrupted_batch_keeps_what_ended(done, tmp_path, monkeypatch):
+    place, _ = done
+    files = {
+        path.name: path.read_bytes()
+        for path in (place / "out" / "sub" / "head").iterdir()
+        if path.is_file()
+    }
+
+    def planned(task):
+        if task.name == "broken.stl":
+            return PartEnd(task.name, 0, "", 1.0, files)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(runners, "plan_part", planned)
+    monkeypatch.setattr(batch_command, "stop_parts", lambda: None)
+    monkeypatch.setattr(runners, "stop_parts", lambda: None)
+    out = tmp_path / "out"
+    ended = run(place / "parts", "-o", out, "--jobs", 1, *FAST)
+    assert ended.exit_code == 130
+    assert [row["part"] for row in rows(out)] == ["broken.stl"]
+
+
+def test_a_process_that_is_killed_is_begun_again_and_then_told(monkeypatch, tmp_path):
+    count = tmp_path / "count"
+    monkeypatch.setattr(
+        part_task,
+        "_PLAN",
+        f"import os; open({str(count)!r}, 'a').write('x'); os.kill(os.getpid(), 9)",
+    )
+    end = plan_part(PartTask("a.stl", {"a.stl": b""}, {}, (), 1))
+    assert end.code == -signal.SIGKILL
+    assert "killed by signal 9, 2 times" in end.message
+    assert count.read_text() == "xx"
+
+
+def test_a_table_is_read_as_it_was_written(done, tmp_path):
+    place, _ = done
+    before = read_rows(place / "out")
+    write_rows(before.values(), tmp_path)
+    assert read_rows(tmp_path) == before
+    head = before["sub/head.obj"]
+    assert is_whole(head, place / "out")
+    assert not is_whole(replace(head, digest="0"), place / "out")
+    assert not is_whole(replace(head, exit=130), place / "out")
+    (tmp_path / "batch.csv").write_text("no table")
+    assert read_rows(tmp_path) == {}
+
+
+def test_a_part_that_failed_has_no_figures(tmp_path):
+    row = row_of(PartEnd("a.stl", 5, "no time", 2.0, {}), "a", tmp_path, "x")
+    assert (row.verdict, row.message, row.cameras) == ("failed", "no time", "")
+
+
+def test_parts_of_one_stem_get_folders_of_their_own(tmp_path):
+    for name in ("a.stl", "a.obj", "A.ply", "b.obj.gz", "c/a.stl", "notes.txt"):
+        path = tmp_path / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text("x")
+    parts = find_parts([str(tmp_path)])
+    folders = {part.name: part.folder for part in parts}
+    assert folders["b.obj.gz"] == "b"
+    assert folders["c/a.stl"] == "c/a"
+    assert len({folder.lower() for folder in folders.values()}) == 5
+    assert "notes.txt" not in folders
+    assert len(find_parts([str(tmp_path / "*.stl"), str(tmp_path / "a.stl")])) == 1
+
+
+@pytest.mark.parametrize("given", ["nothing-*.obj", "empty"])
+def test_no_part_is_one_line(tmp_path, monkeypatch, given):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match="no mesh there"):
+        find_parts([given])
+
+
+def test_what_a_mesh_and_a_rig_refer_to_goes_along(tmp_path):
+    (tmp_path / "m.gltf").write_text('{"buffers": [{"uri": "m.bin"}, {"uri": "../x"}]}')
+    (tmp_path / "m.bin").write_bytes(b"data")
+    assert list(part_files(tmp_path / "m.gltf")) == ["m.gltf", "m.bin"]
+    (tmp_path / "wall.stl").write_bytes(b"wall")
+    rig = tmp_path / "r.toml"
+    rig.write_text('[[obstacle]]\nname = "w"\nshape = "mesh"\nfile = "wall.stl"\n')
+    assert rig_files(str(rig)) == {"r.toml": rig.read_bytes(), "wall.stl": b"wall"}
+    assert rig_files("default") == {}
+
+
+def test_a_scheduler_that_isnt_there_is_one_line(done, tmp_path, monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(runners, "_ANSWERS_S", 1)
+    place, _ = done
+    words = (place / "parts", "-o", tmp_path, "--scheduler", "tcp://127.0.0.1:9")
+    ended = run(*words, *FAST)
+    assert ended.exit_code == 2
+    assert "no scheduler answers there" in ended.stderr
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_workers_of_a_cluster_plan_the_same(done, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    place, _ = done
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+    ) as cluster:
+        address = cluster.scheduler_address
+        words = ("-o", tmp_path / "out", "--scheduler", address, *FAST)
+        ended = run(place / "parts" / "broken.stl", *words)
+    assert ended.exit_code == 1, ended.stderr
+    assert "1 worker" in ended.stderr
+    here, there = rows(place / "out")[0], rows(tmp_path / "out")[0]
+    assert (here["exit"], here["message"]) == (there["exit"], there["message"])
