@@ -28,6 +28,7 @@ from .steps.best_kept import Keep, Search, best_kept
 from .steps.cameras_alone.stages import planned_alone
 from .steps.carried import devices_of_heads, pattern_of_rig
 from .steps.checked import axes_may_help, missed_by, with_check
+from .steps.front.taken_point import TakenPoint
 from .steps.heads import heads_sought
 from .steps.joint.joining import jointly
 from .steps.prepare import prepared, request_of, standing_devices
@@ -82,6 +83,7 @@ def plan_rig(
     keep: Keep | None = None,
     checked: Checked | None = None,
     fixed: Mounted | None = None,
+    take: TakenPoint | None = None,
     on_miss: Literal["raise", "return"] = "raise",
 ) -> RigPlan:
     """Plan the projectors and cameras that measure a surface, and check the plan.
@@ -137,6 +139,7 @@ def plan_rig(
             also the first one, before its poses are improved.
         checked: Receives it with what the check found.
         fixed: Devices that stay where they are and count, from `read_mounted`.
+        take: A point of a front, whose numbers of devices and candidates are taken.
         on_miss: Whether a plan that misses a requirement is raised with the error, or
             returned.
 
@@ -150,6 +153,8 @@ def plan_rig(
         TimeLimitError: If the time limit came before any plan.
     """
     rig = rig if fixed is None else fixed.on(rig)
+    if take is not None:
+        max_projectors, max_cameras = take.point.count
     evaluates = max_projectors is None and max_heads is None
     if max_heads is not None:
         max_projectors, max_cameras = devices_of_heads(rig, max_heads)
@@ -194,6 +199,8 @@ def plan_rig(
         planned = jointly(_evaluated if evaluates else robustly(_planned))
         if wishes.pattern == "none":
             planned = planned_alone
+        if take is not None:
+            planned = take.planned
         plan, partial = planned(request, clock, keep)
         if check and not plan.document.truncated:
             plan = _checked(plan, request.threads, clock, keep, checked)

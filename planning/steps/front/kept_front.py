@@ -3,7 +3,7 @@
 import hashlib
 import json
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from planning.model.device_poses import moved_to
 from planning.model.errors import InputError, PlanFileError
 from planning.model.files import reading
-from planning.model.front import Front
+from planning.model.front import Front, FrontPoint
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.projectors.candidate_set import CandidateSet
 from planning.report.partial_plan import Prepared
@@ -28,7 +28,7 @@ FRONT_FILE = "pareto.npz"
 _FORMAT, _VERSION = "ringrig-front", 1
 _ARRAYS = (
     *("stages", "seen", "projector_poses", "projector_rings", "projector_models"),
-    *("camera_poses", "camera_models"),
+    *("camera_poses", "camera_models", "point_rings"),
 )
 _AGAIN = "make the front again with --pareto"
 
@@ -41,7 +41,8 @@ class KeptFront:
         front: The points.
         digests: Of what the matrix depends on, by what it is.
         arrays: Candidates that don't stand already, the first limit that projectors
-            violate, and what cameras see, eight samples a byte.
+            violate, and what cameras see, eight samples a byte; ring frames of every
+            point's projectors, point after point.
     """
 
     front: Front
@@ -49,8 +50,17 @@ class KeptFront:
     arrays: dict[str, NDArray[Any]]
 
     @classmethod
-    def of(cls, ready: Prepared, matrix: FrontMatrix, front: Front) -> "KeptFront":
-        """Return a front with what it was chosen from."""
+    def of(
+        cls,
+        ready: Prepared,
+        matrix: FrontMatrix,
+        front: Front,
+        taken: Iterable[PlannedProjector],
+    ) -> "KeptFront":
+        """Return a front with what it was chosen from.
+
+        `taken` are the projectors of every point, point after point.
+        """
         projectors = movable(matrix.candidates.projectors)
         cameras = movable(matrix.cameras)
         return cls(
@@ -64,6 +74,7 @@ class KeptFront:
                 "projector_models": _models(projectors, ready.templates),
                 "camera_poses": _poses(cameras),
                 "camera_models": _models(cameras, ready.cameras),
+                "point_rings": np.stack([p.world_from_ring for p in taken]),
             },
         )
 
@@ -76,6 +87,15 @@ class KeptFront:
             "front": self.front.to_document(),
         }
         np.savez_compressed(file, head=np.array(json.dumps(head)), **self.arrays)
+
+    def rings_of(self, point: FrontPoint) -> NDArray[np.float64]:
+        """Return the ring frames of a point's projectors, shape (k, 4, 4)."""
+        before = [p.projectors for p in self.front.points[: self._place(point)]]
+        first = sum(before)
+        return self.arrays["point_rings"][first : first + point.projectors]
+
+    def _place(self, point: FrontPoint) -> int:
+        return [one.count for one in self.front.points].index(point.count)
 
     def matrix(self, ready: Prepared) -> FrontMatrix:
         """Return the matrix, of the mesh, rig and requirements that it was made for.
@@ -117,7 +137,9 @@ class KeptFront:
         )
 
     def _check(self, digests: dict[str, str]) -> None:
-        other = [name for name, digest in digests.items() if self.digests[name] != digest]
+        other = [
+            name for name, digest in digests.items() if self.digests[name] != digest
+        ]
         if other:
             raise InputError(
                 f"{FRONT_FILE} was made for another {' and '.join(other)}: its matrix "

@@ -4,27 +4,27 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.parallel import n_threads
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.front import Front, FrontPoint, marked
+from planning.model.planned import PlannedProjector
 from planning.model.progress import Report, Stopwatch
 from planning.report.live_bar import shown
-from planning.report.partial_plan import PlanRequest
 from planning.rig.mounted import Mounted
 from planning.rig.rig import Rig
 from planning.rig.wishes import Wishes
 from planning.rings.acquisition import n_frames, pixels_read
 from planning.scene.interest import Select, Weight
 from planning.steps.prepare import prepared, request_of
-from threadpoolctl import threadpool_limits
 
 from .best_counts import BestCount
 from .choices import Choice, Chooser
+from .fresh_figures import Figures, FreshFigures
 from .front_matrix import FrontMatrix, matrix_of
 from .front_refused import check_front
-from .fresh_figures import Figures, FreshFigures
 from .kept_front import KeptFront
 
 _Count = tuple[int, int]
@@ -92,14 +92,17 @@ def plan_front(
                 f"{max(chooser.lit)}` says which limits stop it"
             )
         with clock.stage("claims", "front: every rig on fresh samples"):
-            front = _judged(chooser, choices, clock)
-        return KeptFront.of(ready, matrix, front)
+            front, taken = _judged(chooser, choices, clock)
+        return KeptFront.of(ready, matrix, front, taken)
 
 
 def _judged(
     chooser: Chooser, choices: Mapping[_Count, Choice], clock: Stopwatch
-) -> Front:
-    """Areas and deviations of every point, none below those of fewer devices."""
+) -> tuple[Front, list[PlannedProjector]]:
+    """Areas and deviations of every point, none below those of fewer devices.
+
+    Also the projectors of each, point after point.
+    """
     matrix, asked = chooser.matrix, chooser.ready.scene.requirements
     fresh = FreshFigures(matrix)
     fresh.look_with(c for choice in choices.values() for c in choice.cameras)
@@ -121,10 +124,10 @@ def _judged(
             of_these=None if choice.most is None else choice.most * _weight(matrix),
             meets=_meets(chooser, fresh, figures, reached),
         )
-        for count, (choice, figures) in sorted(taken.items())
+        for count, (choice, figures) in _in_order(taken)
     )
     area = weight * len(fresh.target)
-    return Front(
+    front = Front(
         area_m2=area,
         reachable_by_projectors_m2=weight * int(reached.sum()),
         samples=len(matrix.target),
@@ -140,6 +143,14 @@ def _judged(
         },
         points=marked(points, area),
     )
+    every = (choice.projectors for _, (choice, _) in _in_order(taken))
+    return front, [projector for some in every for projector in some]
+
+
+def _in_order(
+    taken: Mapping[_Count, tuple[Choice, Figures]],
+) -> list[tuple[_Count, tuple[Choice, Figures]]]:
+    return [(count, taken[count]) for count in sorted(taken)]
 
 
 def _weight(matrix: FrontMatrix) -> float:
@@ -194,7 +205,9 @@ def _point(
     meets: bool,
 ) -> FrontPoint:
     sigma = figures.sigma[figures.measured]
-    median, p95 = np.quantile(sigma, (0.5, 0.95)).tolist() if len(sigma) else (None,) * 2
+    median, p95 = (
+        np.quantile(sigma, (0.5, 0.95)).tolist() if len(sigma) else (None,) * 2
+    )
     return FrontPoint(
         projectors=count[0],
         cameras=count[1],
