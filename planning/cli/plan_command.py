@@ -22,6 +22,7 @@ from planning.scene.ranges.ranged_body import RangedBody, read_ranges
 from planning.steps.checked import missed_by
 
 from .console import print_json, progress, writable
+from .kept_fronts import front_folder, taken_point
 from .lines.object_lines import optics_lines, size_lines
 from .saved_plans import SavedPlans
 
@@ -54,26 +55,29 @@ _OURS = 0.95
 
 def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
     """Plan, write the output folder, print the result; return the exit code."""
-    begin, limit = click.get_current_context().obj, options["time_limit"]
-    limit = None if limit is None else _OURS * limit
-    clock = Stopwatch(time_limit=limit, begin=begin)
+    clock = timed(options)
     path = Path(options["ranges"] or options["meshes"][0])
     evaluates = options["max_projectors"] is None and options["max_heads"] is None
     result = "evaluation" if evaluates else "plan"
     folder = options["output"] or Path(f"{path.name.split('.')[0]}-{result}")
+    take = None
+    if options["take"] is not None:
+        folder = front_folder(options, path)
+        take = taken_point(options["take"], folder)
     threads = options["threads"] or n_threads()
     check, interrupted = not options["no_check"], False
     with writable(folder), progress(quiet=options["quiet"]) as report:
         saved = SavedPlans(folder, report, patterns=not options["no_patterns"])
         with clock.ticking():
             rig = load_rig(options["rig_name"], light=options["light"])
-            fixed = _fixed(options["fixed"], rig)
-            surface, interest = _read(path, options, rig, report)
+            fixed = read_fixed(options["fixed"], rig)
+            surface, interest = read_object(path, options, rig, report)
         try:
             plan = plan_rig(
                 surface,
                 rig,
                 fixed=fixed,
+                take=take,
                 select=interest,
                 threads=threads,
                 check=check,
@@ -103,7 +107,14 @@ def plan_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
     return RequirementError.exit_code if missed else 0
 
 
-def _fixed(words: str | None, rig: Rig) -> Mounted | None:
+def timed(options: Mapping[str, Any]) -> Stopwatch:
+    """Return the clock of a command, which began when its process did."""
+    begin, limit = click.get_current_context().obj, options["time_limit"]
+    limit = None if limit is None else _OURS * limit
+    return Stopwatch(time_limit=limit, begin=begin)
+
+
+def read_fixed(words: str | None, rig: Rig) -> Mounted | None:
     """Read devices that stay where they are: all of a file, or those that are named."""
     if words is None:
         return None
@@ -111,7 +122,7 @@ def _fixed(words: str | None, rig: Rig) -> Mounted | None:
     return read_mounted(path, rig, names)
 
 
-def _read(
+def read_object(
     path: Path, options: Mapping[str, Any], rig: Rig, report: Report
 ) -> tuple[TriangleMesh | RangedBody, Interest | None]:
     """Read what is to be measured, and which part of it is the user's own target."""

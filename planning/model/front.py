@@ -1,11 +1,15 @@
 """What each number of projectors and cameras gives: the points of a front."""
 
+import math
+
 from planning.model.document.certificates import Count
 from planning.model.document.part import Part
 from planning.model.document.ring_records import AxisTaken
 
 # Coverage and deviations are compared as they are printed: 0.1 %, 0.001 mm.
 _SHARE, _LENGTH_M = 1e-3, 1e-6
+# Standard errors by which a bound of samples is raised, to speak of others too.
+_ERRORS = 2.0
 
 
 class FrontPoint(Part):
@@ -71,6 +75,16 @@ class Front(Part):
     camera_candidates: Count
     asked: dict[str, float]
     points: tuple[FrontPoint, ...]
+
+    def at_most_share(self, point: FrontPoint) -> float:
+        """Return the share of the target that no so many candidates exceed.
+
+        That of the matrix's samples, and two standard errors for any others: with b of
+        n samples sqrt(b (1 - b) / n) each.
+        """
+        share = point.at_most_m2 / self.area_m2
+        error = math.sqrt(max(share * (1.0 - share), 0.0) / self.samples)
+        return min(1.0, share + _ERRORS * error)
 
     def point(self, projectors: int, cameras: int) -> FrontPoint | None:
         """Return the point of so many devices; None: it wasn't looked at."""

@@ -21,6 +21,8 @@ _OF_PLANS = {
     "robust": None,
     "prove": False,
     "cameras_by": "both",
+    "pareto": False,
+    "take": None,
 }
 
 

@@ -14,6 +14,7 @@ from planning.cli.console import (
     threads_option,
 )
 
+from .front_options import check_front_options, front_options
 from .plan_checks import check_options, check_projectors
 from .survival_options import survival_options
 
@@ -33,7 +34,8 @@ _GROUPS = {
         *("accuracy_mm", "accuracy_of", "robust", "views", "survive"),
     ),
     "How it is sought": (
-        *("cameras_by", "joint", "prove", "seed", "time_limit", "threads", "no_check"),
+        *("pareto", "take", "cameras_by", "joint", "prove"),
+        *("seed", "time_limit", "threads", "no_check"),
     ),
     "Output": (
         *("output", "no_patterns", "no_report"),
@@ -92,7 +94,8 @@ class GroupedCommand(click.Command):
     "--max-projectors",
     type=click.IntRange(0),
     metavar="N",
-    help="Projectors at most; needed unless --max-heads or --pattern none is given.",
+    help="Projectors at most; needed unless --max-heads, --pareto or --pattern none is "
+    "given.",
 )
 @click.option(
     "--max-cameras",
@@ -208,6 +211,7 @@ class GroupedCommand(click.Command):
     "and calibrated as the rig's [mounting] and [calibration] say [default: none].",
 )
 @survival_options
+@front_options
 @click.option(
     "--cameras-by",
     type=click.Choice(["cover", "paper", "both"]),
@@ -253,8 +257,14 @@ class GroupedCommand(click.Command):
 @output_options
 def rig_command(**options: Any) -> None:  # noqa: ANN401
     """Plan a rig for a mesh, or for ranges (the default command)."""
+    from planning.cli.front_command import front_command
     from planning.cli.plan_command import plan_command
 
     check_options(options)
-    check_projectors(options)
+    if options["pareto"] or options["take"] is not None:
+        check_front_options(options)
+    else:
+        check_projectors(options)
+    if options["pareto"]:
+        run(lambda: front_command(options), debug=options["debug"])
     run(lambda: plan_command(options, sys.argv[1:]), debug=options["debug"])

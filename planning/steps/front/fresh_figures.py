@@ -1,6 +1,6 @@
 """What rigs of a front do to samples that none was chosen on."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,10 +11,10 @@ from planning.proofs.quotas import RegionFloors
 from planning.report.entries.device_entries import rounded_camera, rounded_projector
 from planning.report.reach import furthest_lit, measured_by_any
 from planning.scene.camera_views import CameraView, camera_views
-from planning.scene.draws import DRAWS
+from planning.scene.draws import DRAWS, Draw
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.measured import LitSamples, pairs_of
+from planning.scene.measured import LitSamples, lit_samples, pairs_of
 from planning.scene.scene import Scene
 
 from .choices import Choice
@@ -97,9 +97,7 @@ class FreshFigures:
         if key not in self._sigma:
             samples, sight = self._lit(projector)[0], self._views[camera]
             sigma = np.full(len(self.target), np.inf)
-            limits = self._scene.requirements.triangulation
-            for pair in pairs_of(limits, samples, sight.view, samples=sight.samples):
-                sigma[pair.samples[pair.measured]] = pair.quality.total[pair.measured]
+            _lower(sigma, self._scene, samples, sight)
             self._sigma[key] = sigma
         return self._sigma[key]
 
@@ -118,3 +116,28 @@ class FreshFigures:
             )
             self._reached[lights] = reached
         return self._reached[lights]
+
+
+def best_sigma(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    cameras: Sequence[PlannedCamera],
+    draw: Draw,
+) -> NDArray[np.float64]:
+    """Return the deviation of each lit sample's best pair [m], infinite for none."""
+    among = scene.among((*projectors, *cameras))
+    lit = lit_samples(among, projectors, scene.target_samples(draw))
+    sigma = np.full(len(lit.target), np.inf)
+    for sight in camera_views(among, cameras, lit.target):
+        _lower(sigma, scene, lit, sight)
+    return sigma
+
+
+def _lower(
+    sigma: NDArray[np.float64], scene: Scene, lit: LitSamples, sight: CameraView
+) -> None:
+    """Lower deviations to those of one camera's pairs, where they are less."""
+    limits = scene.requirements.triangulation
+    for pair in pairs_of(limits, lit, sight.view, samples=sight.samples):
+        rows = pair.samples[pair.measured]
+        sigma[rows] = np.minimum(sigma[rows], pair.quality.total[pair.measured])

@@ -3,6 +3,7 @@
 import hashlib
 import json
 import zipfile
+import zlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,6 +31,7 @@ _ARRAYS = (
     *("stages", "seen", "projector_poses", "projector_rings", "projector_models"),
     *("camera_poses", "camera_models", "point_rings"),
 )
+_DAMAGED = (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error)
 _AGAIN = "make the front again with --pareto"
 
 
@@ -86,7 +88,8 @@ class KeptFront:
             "digests": self.digests,
             "front": self.front.to_document(),
         }
-        np.savez_compressed(file, head=np.array(json.dumps(head)), **self.arrays)
+        arrays: Any = self.arrays | {"head": np.array(json.dumps(head))}
+        np.savez_compressed(file, **arrays)
 
     def rings_of(self, point: FrontPoint) -> NDArray[np.float64]:
         """Return the ring frames of a point's projectors, shape (k, 4, 4)."""
@@ -162,7 +165,7 @@ def read_front(folder: Path) -> KeptFront:
                 arrays = {name: file[name] for name in _ARRAYS}
             known = head["format"], head["version"]
             kept = KeptFront(Front(**head["front"]), dict(head["digests"]), arrays)
-        except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        except _DAMAGED as error:
             what = "a field" if isinstance(error, ValidationError) else str(error)
             raise PlanFileError(
                 f"{path}: is no front, or a damaged one ({what}); {_AGAIN}"

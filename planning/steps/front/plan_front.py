@@ -18,6 +18,7 @@ from planning.rig.rig import Rig
 from planning.rig.wishes import Wishes
 from planning.rings.acquisition import n_frames, pixels_read
 from planning.scene.interest import Select, Weight
+from planning.scene.ranges.ranged_body import RangedBody
 from planning.steps.prepare import prepared, request_of
 
 from .best_counts import BestCount
@@ -31,7 +32,7 @@ _Count = tuple[int, int]
 
 
 def plan_front(
-    mesh: TriangleMesh,
+    mesh: TriangleMesh | RangedBody,
     rig: Rig,
     wishes: Wishes,
     *,
@@ -46,7 +47,7 @@ def plan_front(
     """Return what every number of projectors and cameras gives.
 
     Args:
-        mesh: The surface, in metres.
+        mesh: The surface, in metres; a body known by its ranges is refused.
         rig: Devices and limits, from `load_rig`.
         wishes: What is asked; `max_projectors` 0: as many as light nearly all that can
             be lit, `max_cameras` None: as many as then measure nearly all of it, eight

@@ -28,6 +28,7 @@ from planning.report.partial_plan import PartialPlan, PlanRequest, Prepared
 from planning.rig.devices.lens_fit import check_fields
 from planning.rings.axis_moves import move_ring_axes
 from planning.rings.centred_axes import centred_axes
+from planning.scene.draws import DRAWS
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.measured import LitSamples, measured_by, taken
@@ -37,11 +38,15 @@ from planning.steps.prepare import prepared
 from planning.steps.stages import bounded_cameras
 
 from .best_counts import with_more
+from .fresh_figures import best_sigma
 from .front_matrix import FrontMatrix
 from .front_refused import check_front
 from .kept_front import KeptFront
 
 _Projectors = tuple[PlannedProjector, ...]
+
+# Times what a point promises of errors: so far they may grow for larger baselines.
+_MORE = 1.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +70,8 @@ class TakenPoint:
         axes = "free" if request.axis_wanted == "free" else self.point.axes
         stage, projectors = self._projectors(ready, matrix, clock)
         with clock.stage("cameras", "cameras: those of the point, for these poses"):
-            cameras = _Cameras(ready.scene, matrix, self.point)
+            share = self.point.measured_m2 / self.kept.front.area_m2
+            cameras = _Cameras(ready.scene, matrix, self.point, share)
             projectors, views = cameras.placed(projectors, axes, request.ring_margin)
         partial = PartialPlan(
             *(ready, stage, projectors, views, views.cameras), axes=axes
@@ -144,12 +150,14 @@ def _fewest_known(proof: Certificate) -> bool:
 class _Cameras:
     """Chooses a point's number of cameras for projectors that moved.
 
-    What they see is kept, so that other light on it costs no ray.
+    What they see is kept, so that other light on it costs no ray. `share` is what the
+    point measures of the target.
     """
 
     scene: Scene
     matrix: FrontMatrix
     point: FrontPoint
+    share: float
 
     def placed(
         self, projectors: _Projectors, axes: AxisTaken | None, margin: float
@@ -166,7 +174,7 @@ class _Cameras:
             chosen = self._chosen(measured, samples, chosen)
         return projectors, self._stage(samples, measured, chosen)
 
-    def with_axes_for(
+    def _with_axes_for(
         self,
         projectors: _Projectors,
         cameras: Sequence[PlannedCamera],
@@ -184,6 +192,26 @@ class _Cameras:
         if proves_as_much(selection, stage.certificate, len(chosen)):
             return moved, again
         return projectors, stage
+
+    def with_rings(
+        self, partial: PartialPlan, cameras: tuple[PlannedCamera, ...]
+    ) -> PartialPlan:
+        """Return the plan with other cameras, and ring axes and radii for them."""
+        partial = replace(partial, cameras=cameras)
+        projectors, stage = partial.projectors, partial.camera_stage
+        if partial.axes is None:
+            return partial
+        if partial.axes == "free":
+            projectors, stage = self._with_axes_for(projectors, cameras, stage)
+        rings = rings_for_pairs(
+            self.scene.among((*projectors, *cameras)),
+            projectors,
+            cameras,
+            partial.request.rig.rings.spacing,
+            stage.cover.samples,
+            margin=partial.request.ring_margin,
+        )
+        return replace(partial, projectors=projectors, camera_stage=stage, rings=rings)
 
     def _stage(
         self,
@@ -215,33 +243,43 @@ class _Cameras:
         samples: LitSamples,
         kept: NDArray[np.int64] | None = None,
     ) -> NDArray[np.int64]:
-        """Candidates that measure most, those chosen before where they do as much."""
+        """Those chosen before where they measure what the point says; else the most."""
         if kept is None:
             kept = np.array(self.point.views, dtype=np.int64)
         scene, cameras = self.matrix.scene, self.matrix.cameras
         cover = candidate_cover(scene, measured, samples, cameras)
+        if cover.n_covered(kept) >= self.share * len(self.matrix.target):
+            return kept
         best, _ = cover.most_covering(len(kept), kept)
         best = with_more(cover, best, len(kept))
         return max((kept, best), key=cover.n_covered)
 
 
 def _apart(partial: PartialPlan, views: _Cameras, clock: Stopwatch) -> PartialPlan:
-    """Cameras as far apart as coverage allows, and rings for them."""
-    scene, projectors, stage = partial.scene, partial.projectors, partial.camera_stage
+    """Cameras as far apart as coverage allows, and rings for them.
+
+    They stay where they are if errors would grow beyond what the point promises.
+    """
     with clock.stage("baselines", "baselines: the largest that coverage allows"):
-        ((_, moved),) = widest_routes(scene, projectors, stage)
-    partial = replace(partial, cameras=moved.cameras)
-    if partial.axes is None:
-        return partial
+        stage = partial.camera_stage
+        ((_, moved),) = widest_routes(partial.scene, partial.projectors, stage)
     with clock.stage("rings", "rings: axes and radii for the surface and the cameras"):
-        if partial.axes == "free":
-            projectors, stage = views.with_axes_for(projectors, moved.cameras, stage)
-        rings = rings_for_pairs(
-            scene.among((*projectors, *moved.cameras)),
-            projectors,
-            moved.cameras,
-            partial.request.rig.rings.spacing,
-            stage.cover.samples,
-            margin=partial.request.ring_margin,
+        wide = views.with_rings(partial, moved.cameras)
+        promised, errors = views.point.sigma_p95_m, _errors(wide)
+        if promised is None or errors <= _MORE * promised:
+            return wide
+        near = views.with_rings(partial, partial.cameras)
+        if (nearer := _errors(near)) >= errors:
+            return wide
+        clock.say(
+            f"  not taken: 95 % within {1e3 * errors:.3f} mm, and {1e3 * nearer:.3f} "
+            f"where the cameras are"
         )
-    return replace(partial, projectors=projectors, camera_stage=stage, rings=rings)
+        return near
+
+
+def _errors(partial: PartialPlan) -> float:
+    """Standard deviation that 5 % of what is measured exceed, of the front's draw."""
+    scene, cameras = partial.scene, partial.cameras
+    sigma = best_sigma(scene, partial.final_projectors, cameras, DRAWS.front)
+    return float(np.quantile(sigma[np.isfinite(sigma)], 0.95))
