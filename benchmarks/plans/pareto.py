@@ -1,19 +1,20 @@
-"""The front of three meshes, and each of its points taken, beside plans from nothing.
+"""The front of three meshes, and points of it taken, beside plans from nothing.
 
-The front is of up to three projectors and four cameras. Then each point is taken, as
-`plan --take` does, and as many devices are planned from nothing. Printed are the
-seconds of each (no check from pixels, no pictures), and measured shares of the target:
-as the front said, as the taken plan claims on samples of its own, and as the plan from
-nothing does, which stops at the fewest devices that meet what is asked. A taken point
-may claim less than the front said by the sampling error alone: two standard errors of
-both draws.
+The front is of up to three projectors and four cameras. Then some of its points (all,
+with `--all`) are taken, as `plan --take` does, and as many devices are planned from
+nothing. Printed are the seconds of each (no check from pixels, no pictures), and
+measured shares of the target: as the front said, as the taken plan claims on samples of
+its own, and as the plan from nothing does, which stops at the fewest devices that meet
+what is asked. A taken point may claim less than the front said by the sampling error
+alone: two standard errors of both draws.
 
-    PYTHONPATH=. python -m benchmarks.plans.pareto [MESH ...] > FILE
+    PYTHONPATH=. python -m benchmarks.plans.pareto [--all] [MESH ...] > FILE
 """
 
 import io
 import sys
 import time
+from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -36,17 +37,20 @@ ROOT = Path(__file__).parents[2]
 MESHES = ROOT.parent / "shared" / "data" / "meshes"
 UNITS = {"vtk_bunny.ply": "m", "tm_reference.obj": "mm"}
 PROJECTORS, CAMERAS = 3, 4
+POINTS = ((1, 2), (2, 2), (2, 3), (3, 3), (3, 4))
 
 
 def main(words: list[str]) -> int:
     """Print each mesh's front and its points; return 1 where one claims too little."""
-    paths = [Path(word) for word in words]
+    every = tuple(product(range(1, PROJECTORS + 1), range(1, CAMERAS + 1)))
+    counts = every if "--all" in words else POINTS
+    paths = [Path(word) for word in words if word != "--all"]
     paths = paths or [ROOT / "face.obj", *(MESHES / name for name in UNITS)]
     print(f"`python -m benchmarks.plans.pareto`, {n_threads()} threads\n")
-    return int(any([_compared(path) for path in paths]))
+    return int(any([_compared(path, counts) for path in paths]))
 
 
-def _compared(path: Path) -> bool:
+def _compared(path: Path, counts: Sequence[tuple[int, int]]) -> bool:
     """Print what a mesh gives; say whether any taken point claims too little."""
     mesh = load_mesh(path, unit=UNITS.get(path.name))
     rig, begin = load_rig("default"), time.monotonic()
@@ -63,7 +67,7 @@ def _compared(path: Path) -> bool:
     print("|---|---|---|---|---|---|---|", flush=True)
     spent, short = np.zeros(2), False
     kept = _read_again(front)
-    for count in product(range(1, PROJECTORS + 1), range(1, CAMERAS + 1)):
+    for count in counts:
         point = kept.front.point(*count)
         if point is None:
             continue
@@ -99,7 +103,7 @@ def _compared(path: Path) -> bool:
         )
     verdict = "A taken point claims too little." if short else "No claim is too small."
     print(
-        f"\nAll: {seconds:.0f} s for the front, {spent[0]:.0f} s taken, "
+        f"\nTogether: {seconds:.0f} s for the front, {spent[0]:.0f} s taken, "
         f"{spent[1]:.0f} s from nothing. {verdict}\n",
         flush=True,
     )
@@ -133,7 +137,7 @@ def _claims_less(front: Front, point: FrontPoint, plan: RigPlan) -> bool:
     said = point.measured_m2 / front.area_m2
     draws = 1.0 / front.fresh_samples + 1.0 / plan.coverage.samples
     error = np.sqrt(said * (1.0 - said) * draws)
-    return _share(plan) < said - 2.0 * error
+    return bool(_share(plan) < said - 2.0 * error)
 
 
 if __name__ == "__main__":

@@ -140,14 +140,12 @@ class KeptFront:
         )
 
     def _check(self, digests: dict[str, str]) -> None:
-        other = [
-            name for name, digest in digests.items() if self.digests[name] != digest
-        ]
-        if other:
-            raise InputError(
-                f"{FRONT_FILE} was made for another {' and '.join(other)}: its matrix "
-                f"holds no longer; give the same, or {_AGAIN}"
-            )
+        for name, digest in digests.items():
+            if self.digests.get(name) != digest:
+                raise InputError(
+                    f"{FRONT_FILE} was made for another {name}: its matrix holds no "
+                    f"longer; give the same, or {_AGAIN}"
+                )
 
 
 def read_front(folder: Path) -> KeptFront:
@@ -160,7 +158,7 @@ def read_front(folder: Path) -> KeptFront:
     path = folder / FRONT_FILE
     with reading(path, InputError, absent=f"; {_AGAIN}"):
         try:
-            with np.load(path, allow_pickle=False) as file:
+            with path.open("rb") as opened, np.load(opened) as file:
                 head = json.loads(str(file["head"]))
                 arrays = {name: file[name] for name in _ARRAYS}
             known = head["format"], head["version"]
@@ -179,20 +177,22 @@ def read_front(folder: Path) -> KeptFront:
 
 
 def digests_of(ready: Prepared) -> dict[str, str]:
-    """Return a digest of each thing that a matrix depends on.
+    """Return a digest of each thing that a matrix depends on, causes first.
 
     How many devices there may be it doesn't depend on.
     """
     scene, request = ready.scene, ready.request
     asked = scene.requirements.to_document()
+    # Free axes after centred ones that didn't pass the check are no other question.
+    axis = replace(request, axis_wanted=None).ring_axis
     for name in ("max_projectors", "max_cameras"):
         del asked[name]
     return {
         "mesh": _digest(scene.mesh.vertices, scene.mesh.faces),
-        "target": _digest(scene.region, scene.steep),
         "rig": _digest(request.rig.to_document()),
-        "set of requirements": _digest(asked | {"ring_axis": request.ring_axis}),
         "seed": _digest(request.seed),
+        "target": _digest(scene.region, scene.steep),
+        "set of requirements": _digest(asked | {"ring_axis": axis}),
     }
 
 
