@@ -12,6 +12,7 @@ from planning.cache.cache import NO_CACHE, Cache
 from planning.model.document.certificates import CamerasBy
 from planning.model.document.family_records import AlignedBy
 from planning.model.document.ring_records import RingAxis
+from planning.model.errors import InputError
 from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
 from planning.model.progress import TIME_IS_UP, Report, Stopwatch
 from planning.report.assemble import write_plan
@@ -32,6 +33,7 @@ from .steps.carried import devices_of_heads, pattern_of_rig
 from .steps.checked import axes_may_help, missed_by, with_check
 from .steps.family.family_plan import with_members
 from .steps.family.family_search import family_sought, write_family
+from .steps.front.taken_point import TakenPoint
 from .steps.heads import heads_sought
 from .steps.joint.joining import jointly
 from .steps.prepare import prepared, request_of, standing_devices
@@ -88,6 +90,7 @@ def plan_rig(
     keep: Keep | None = None,
     checked: Checked | None = None,
     fixed: Mounted | None = None,
+    take: TakenPoint | None = None,
     on_miss: Literal["raise", "return"] = "raise",
     cache: Cache = NO_CACHE,
 ) -> RigPlan:
@@ -148,6 +151,7 @@ def plan_rig(
             also the first one, before its poses are improved.
         checked: Receives it with what the check found.
         fixed: Devices that stay where they are and count, from `read_mounted`.
+        take: A point of a front, whose numbers of devices and candidates are taken.
         on_miss: Whether a plan that misses a requirement is raised with the error, or
             returned.
         cache: What was answered before, and is kept for later runs: the plan is the
@@ -163,6 +167,8 @@ def plan_rig(
         TimeLimitError: If the time limit came before any plan.
     """
     rig = rig if fixed is None else fixed.on(rig)
+    if take is not None:
+        max_projectors, max_cameras = take.point.count
     evaluates = max_projectors is None and max_heads is None
     if max_heads is not None:
         max_projectors, max_cameras = devices_of_heads(rig, max_heads)
@@ -212,10 +218,14 @@ def plan_rig(
         )
         check_request(request)
         if request.family is not None:
+            if take is not None:
+                raise InputError("take is a point of one mesh's front: give one mesh")
             return _of_family(request, clock, keep, checked, check, on_miss)
         planned = jointly(_evaluated if evaluates else robustly(_planned))
         if wishes.pattern == "none":
             planned = planned_alone
+        if take is not None:
+            planned = take.planned
         plan, partial = planned(request, clock, keep)
         if check and not plan.document.truncated:
             plan = _checked(plan, request.threads, clock, keep, checked)

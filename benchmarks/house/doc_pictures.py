@@ -14,6 +14,7 @@ from pathlib import Path
 from PIL import Image
 
 from benchmarks.pictures import (
+    front_pictures,
     light_pictures,
     measured_pictures,
     page_pictures,
@@ -45,6 +46,7 @@ PICTURES: dict[str, Callable[[Job], Image.Image]] = {
     "cells": light_pictures.cells,
     "openness": light_pictures.openness,
     "cost": paper_pictures.cost,
+    "pareto": front_pictures.pareto,
     "lit": word_pictures.lit,
     "seen": word_pictures.seen,
     "measured": word_pictures.measured,

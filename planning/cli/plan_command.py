@@ -24,6 +24,7 @@ from planning.steps.checked import missed_by
 from planning.steps.recalled_mesh import recalled_mesh
 
 from .console import print_json, progress, reporter, writable
+from .kept_fronts import front_folder, taken_point
 from .lines.object_lines import optics_lines, size_lines
 from .saved_plans import SavedPlans
 
@@ -88,15 +89,17 @@ def planned_once(
     Returns:
         The exit code, and the plan that stands.
     """
-    limit = options["time_limit"]
-    limit = None if limit is None else _OURS * limit
-    clock = Stopwatch(time_limit=limit, begin=begin)
+    clock = timed(options, begin)
     path = Path(options["ranges"] or options["meshes"][0])
     several = len(options["meshes"]) > 1
     evaluates = options["max_projectors"] is None and options["max_heads"] is None
     result = "evaluation" if evaluates else "plan"
     result = f"family-{result}" if several else result
     folder = options["output"] or Path(f"{path.name.split('.')[0]}-{result}")
+    take = None
+    if options["take"] is not None:
+        folder = front_folder(options, path)
+        take = taken_point(options["take"], folder)
     threads = options["threads"] or n_threads()
     check, interrupted = not options["no_check"], False
     with writable(folder), progress(quiet=options["quiet"]) as report:
@@ -116,17 +119,18 @@ def planned_once(
 
         with clock.ticking():
             rig = load_rig(options["rig_name"], light=options["light"])
-            fixed = _fixed(options["fixed"], rig)
+            fixed = read_fixed(options["fixed"], rig)
             surface, interest = (
                 (_family(options, rig, report, cache), None)
                 if several
-                else _read(path, options, rig, report, cache)
+                else read_object(path, options, rig, report, cache)
             )
         try:
             plan = plan_rig(
                 surface,
                 rig,
                 fixed=fixed,
+                take=take,
                 select=interest,
                 threads=threads,
                 check=check,
@@ -158,7 +162,14 @@ def planned_once(
     return RequirementError.exit_code if missed else 0, plan
 
 
-def _fixed(words: str | None, rig: Rig) -> Mounted | None:
+def timed(options: Mapping[str, Any], begin: float | None) -> Stopwatch:
+    """Return the clock of a command that began then on the monotonic clock [s]."""
+    limit = options["time_limit"]
+    limit = None if limit is None else _OURS * limit
+    return Stopwatch(time_limit=limit, begin=begin)
+
+
+def read_fixed(words: str | None, rig: Rig) -> Mounted | None:
     """Read devices that stay where they are: all of a file, or those that are named."""
     if words is None:
         return None
@@ -166,12 +177,12 @@ def _fixed(words: str | None, rig: Rig) -> Mounted | None:
     return read_mounted(path, rig, names)
 
 
-def _read(
+def read_object(
     path: Path,
     options: Mapping[str, Any],
     rig: Rig,
     report: Report,
-    cache: Cache,
+    cache: Cache = NO_CACHE,
 ) -> tuple[TriangleMesh | RangedBody, Interest | None]:
     """Read what is to be measured, and which part of it is the user's own target."""
     report(f"reading {path}")

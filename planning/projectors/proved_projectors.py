@@ -32,16 +32,18 @@ def prove_fewest(
     stage: ProjectorStage,
     templates: tuple[PlannedProjector, ...],
     effort: Effort,
+    *,
+    joining: bool = True,
 ) -> ProjectorStage:
     """Return the stage with the bound over all poses in its certificate.
 
     Where the bound leaves room for fewer projectors, candidates are offered there, and
-    the cover is solved again.
+    the cover is solved again; unless none are to be `joining` those that there are.
     """
     source = CandidateSource(scene, templates)
     while stage.certificate.needed.count > stage.certificate.given:
         bound = bound_of(scene, stage, templates, effort)
-        offered = source.towards(bound.directions)
+        offered = source.towards(bound.directions) if joining else ()
         better = _with_more(stage, offered) if offered else stage
         if better is stage:
             return replace(stage, certificate=joined(stage.certificate, bound.proof()))

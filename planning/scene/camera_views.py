@@ -99,6 +99,12 @@ class CandidateViews:
         both._first = self
         return both
 
+    def knowing(self, target: Target, views: Sequence[CameraView]) -> "CandidateViews":
+        """Return the same, with the views of these samples known."""
+        both = CandidateViews(self._scene, self.cameras)
+        both._known = [*self._known, (target.samples.points, tuple(views))]
+        return both
+
     def on(self, target: Target) -> tuple[CameraView, ...]:
         """Return what each camera sees of samples."""
         points = target.samples.points

@@ -51,6 +51,7 @@ class Draws:
     confirming_baselines: Draw = Draw(16_000, 301)
     joint: Draw = Draw(1000, 600)
     joint_margins: Draw = Draw(6000, 610)
+    front: Draw = Draw(12_000, 660)
     rings: Draw = Draw(6000, 400)
     claims: Draw = Draw(12_000, 900)
     region_claims: Draw = Draw(400, 904)

@@ -136,7 +136,11 @@ class Scene:
 
     def within(self, workspace: Workspace) -> "Scene":
         """Return the scene with another workspace."""
-        return self._with(requirements=replace(self.requirements, workspace=workspace))
+        return self.asking(replace(self.requirements, workspace=workspace))
+
+    def asking(self, requirements: Requirements) -> "Scene":
+        """Return the scene of which something else is asked."""
+        return self._with(requirements=requirements)
 
     def with_obstructions(self, obstructions: tuple[Obstruction, ...]) -> "Scene":
         """Return the scene with others standing about."""

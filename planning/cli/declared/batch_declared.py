@@ -15,7 +15,18 @@ from .plan_declared import GroupedCommand, rig_command
 # What is said of one mesh, or of the whole batch.
 _NOT_OF_PARTS = {
     *("meshes", "files", "align", "family_quantile", "ranges", "select", "weight"),
-    *("fixed", "output", "watch", "verbose", "as_json", "quiet", "debug", "threads"),
+    *(
+        "fixed",
+        "output",
+        "watch",
+        "pareto",
+        "take",
+        "verbose",
+        "as_json",
+        "quiet",
+        "debug",
+        "threads",
+    ),
 }
 _OF_PARTS = [p for p in rig_command.params if p.name not in _NOT_OF_PARTS]
 

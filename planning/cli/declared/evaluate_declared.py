@@ -24,6 +24,8 @@ _OF_PLANS = {
     "prove": False,
     "cameras_by": "both",
     "watch": None,
+    "pareto": False,
+    "take": None,
 }
 
 

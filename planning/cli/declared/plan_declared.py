@@ -14,6 +14,7 @@ from planning.cli.console import (
     threads_option,
 )
 
+from .front_options import check_front_options, front_options
 from .plan_checks import check_options, check_projectors, check_watch
 from .survival_options import survival_options
 
@@ -33,8 +34,8 @@ _GROUPS = {
         *("accuracy_mm", "accuracy_of", "robust", "views", "survive"),
     ),
     "How it is sought": (
-        *("cameras_by", "joint", "prove", "seed", "time_limit", "threads", "no_check"),
-        "no_cache",
+        *("pareto", "take", "cameras_by", "joint", "prove"),
+        *("seed", "time_limit", "threads", "no_check", "no_cache"),
     ),
     "Output": (
         *("output", "no_patterns", "no_report"),
@@ -108,7 +109,8 @@ class GroupedCommand(click.Command):
     "--max-projectors",
     type=click.IntRange(0),
     metavar="N",
-    help="Projectors at most; needed unless --max-heads or --pattern none is given.",
+    help="Projectors at most; needed unless --max-heads, --pareto or --pattern none is "
+    "given.",
 )
 @click.option(
     "--max-cameras",
@@ -230,6 +232,7 @@ class GroupedCommand(click.Command):
     "and calibrated as the rig's [mounting] and [calibration] say [default: none].",
 )
 @survival_options
+@front_options
 @click.option(
     "--cameras-by",
     type=click.Choice(["cover", "paper", "both"]),
@@ -280,10 +283,16 @@ class GroupedCommand(click.Command):
 @output_options
 def rig_command(**options: Any) -> None:  # noqa: ANN401
     """Plan a rig for a mesh, or for ranges (the default command)."""
+    from planning.cli.front_command import front_command
     from planning.cli.plan_command import plan_command
 
     check_options(options)
-    check_projectors(options)
+    if options["pareto"] or options["take"] is not None:
+        check_front_options(options)
+    else:
+        check_projectors(options)
+    if options["pareto"]:
+        run(lambda: front_command(options), debug=options["debug"])
     if options["watch"] is not None:
         check_watch(options)
         from planning.cli.watch_command import watch_command as plan_command

@@ -1,0 +1,45 @@
+"""The folder of a front, and which of its points `plan --take` goes on from."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+
+from planning.model.front import Front
+from planning.steps.front.kept_front import FRONT_FILE, read_front
+from planning.steps.front.taken_point import TakenPoint
+
+
+def front_folder(options: Mapping[str, Any], path: Path) -> Path:
+    """Return the folder that a front is kept in."""
+    return options["output"] or Path(f"{path.name.split('.')[0]}-front")
+
+
+def taken_point(count: tuple[int, int], folder: Path) -> TakenPoint:
+    """Return the point of the front that a folder keeps.
+
+    Raises:
+        click.UsageError: If there is no front, or it has no such point.
+        PlanFileError: If its file is damaged.
+    """
+    if not (folder / FRONT_FILE).exists():
+        raise click.UsageError(
+            f"--take {count[0]},{count[1]}: {folder} keeps no front ({FRONT_FILE}); "
+            f"make it with --pareto -o {folder}, or name its folder with -o"
+        )
+    kept = read_front(folder)
+    point = kept.front.point(*count)
+    if point is None:
+        raise click.UsageError(
+            f"--take {count[0]},{count[1]}: the front in {folder} has "
+            f"{_extent(kept.front)}; take one of these, or make it larger with "
+            f"--pareto --max-projectors {count[0]} --max-cameras {count[1]}"
+        )
+    return TakenPoint(kept, point)
+
+
+def _extent(front: Front) -> str:
+    """Say which points there are."""
+    p, c = (sorted({one.count[k] for one in front.points}) for k in (0, 1))
+    return f"{p[0]} to {p[-1]} projectors and {c[0]} to {c[-1]} cameras"

@@ -1,0 +1,218 @@
+"""The file of a front: its candidates, their matrix, and what each point takes."""
+
+import hashlib
+import json
+import zipfile
+import zlib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from planning.model.device_poses import moved_to
+from planning.model.errors import InputError, PlanFileError
+from planning.model.files import reading
+from planning.model.front import Front, FrontPoint
+from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.projectors.candidate_set import CandidateSet
+from planning.report.partial_plan import Prepared
+from planning.scene.draws import DRAWS
+from planning.scene.placed_bodies import Device, existing_devices, movable
+
+from .front_matrix import FrontMatrix
+
+FRONT_FILE = "pareto.npz"
+_FORMAT, _VERSION = "ringrig-front", 1
+_ARRAYS = (
+    *("stages", "seen", "projector_poses", "projector_rings", "projector_models"),
+    *("camera_poses", "camera_models", "point_rings"),
+)
+_DAMAGED = (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error)
+_AGAIN = "make the front again with --pareto"
+
+
+@dataclass(frozen=True, eq=False)
+class KeptFront:
+    """A front with the matrix that it is of, as written to a file.
+
+    Attributes:
+        front: The points.
+        digests: Of what the matrix depends on, by what it is.
+        arrays: Candidates that don't stand already, the first limit that projectors
+            violate, and what cameras see, eight samples a byte; ring frames of every
+            point's projectors, point after point.
+    """
+
+    front: Front
+    digests: dict[str, str]
+    arrays: dict[str, NDArray[Any]]
+
+    @classmethod
+    def of(
+        cls,
+        ready: Prepared,
+        matrix: FrontMatrix,
+        front: Front,
+        taken: Iterable[PlannedProjector],
+    ) -> "KeptFront":
+        """Return a front with what it was chosen from.
+
+        `taken` are the projectors of every point, point after point.
+        """
+        projectors = movable(matrix.candidates.projectors)
+        cameras = movable(matrix.cameras)
+        return cls(
+            front,
+            digests_of(ready),
+            {
+                "stages": matrix.candidates.stages,
+                "seen": np.packbits(matrix.seen, axis=0),
+                "projector_poses": _poses(projectors),
+                "projector_rings": np.stack([p.world_from_ring for p in projectors]),
+                "projector_models": _models(projectors, ready.templates),
+                "camera_poses": _poses(cameras),
+                "camera_models": _models(cameras, ready.cameras),
+                "point_rings": np.stack([p.world_from_ring for p in taken]),
+            },
+        )
+
+    def write(self, file: BinaryIO) -> None:
+        """Write the file."""
+        head = {
+            "format": _FORMAT,
+            "version": _VERSION,
+            "digests": self.digests,
+            "front": self.front.to_document(),
+        }
+        arrays: Any = self.arrays | {"head": np.array(json.dumps(head))}
+        np.savez_compressed(file, **arrays)
+
+    def rings_of(self, point: FrontPoint) -> NDArray[np.float64]:
+        """Return the ring frames of a point's projectors, shape (k, 4, 4)."""
+        before = [p.projectors for p in self.front.points[: self._place(point)]]
+        first = sum(before)
+        return self.arrays["point_rings"][first : first + point.projectors]
+
+    def _place(self, point: FrontPoint) -> int:
+        return [one.count for one in self.front.points].index(point.count)
+
+    def matrix(self, ready: Prepared) -> FrontMatrix:
+        """Return the matrix, of the mesh, rig and requirements that it was made for.
+
+        Raises:
+            InputError: If they are others.
+        """
+        self._check(digests_of(ready))
+        kept, scene = self.arrays, ready.scene.without_floors
+        projectors = tuple(
+            replace(
+                ready.templates[model], world_from_device=pose, world_from_ring=rings
+            )
+            for pose, rings, model in zip(
+                *(kept["projector_poses"], kept["projector_rings"]),
+                kept["projector_models"].tolist(),
+                strict=True,
+            )
+        )
+        cameras = tuple(
+            moved_to(ready.cameras[model], pose)
+            for pose, model in zip(
+                kept["camera_poses"], kept["camera_models"].tolist(), strict=True
+            )
+        )
+        standing = existing_devices(scene.requirements, ready.templates)
+        candidates = CandidateSet(
+            scene,
+            scene.target_samples(DRAWS.projectors),
+            (*standing, *projectors),
+            kept["stages"],
+            len(standing),
+        )
+        n = len(kept["stages"])
+        return FrontMatrix(
+            candidates,
+            (*existing_devices(scene.requirements, ready.cameras), *cameras),
+            np.unpackbits(kept["seen"], axis=0, count=n).astype(bool),
+        )
+
+    def _check(self, digests: dict[str, str]) -> None:
+        for name, digest in digests.items():
+            if self.digests.get(name) != digest:
+                raise InputError(
+                    f"{FRONT_FILE} was made for another {name}: its matrix holds no "
+                    f"longer; give the same, or {_AGAIN}"
+                )
+
+
+def read_front(folder: Path) -> KeptFront:
+    """Read the front that a folder keeps.
+
+    Raises:
+        InputError: If there is none.
+        PlanFileError: If it is damaged, or of another version.
+    """
+    path = folder / FRONT_FILE
+    with reading(path, InputError, absent=f"; {_AGAIN}"):
+        try:
+            with path.open("rb") as opened, np.load(opened) as file:
+                head = json.loads(str(file["head"]))
+                arrays = {name: file[name] for name in _ARRAYS}
+            known = head["format"], head["version"]
+            kept = KeptFront(Front(**head["front"]), dict(head["digests"]), arrays)
+        except _DAMAGED as error:
+            what = "a field" if isinstance(error, ValidationError) else str(error)
+            raise PlanFileError(
+                f"{path}: is no front, or a damaged one ({what}); {_AGAIN}"
+            ) from None
+    if known != (_FORMAT, _VERSION):
+        raise PlanFileError(
+            f"{path}: is {known[0]!r} of version {known[1]}, and {_FORMAT!r} of "
+            f"version {_VERSION} is read; {_AGAIN}"
+        )
+    return kept
+
+
+def digests_of(ready: Prepared) -> dict[str, str]:
+    """Return a digest of each thing that a matrix depends on, causes first.
+
+    How many devices there may be it doesn't depend on.
+    """
+    scene, request = ready.scene, ready.request
+    asked = scene.requirements.to_document()
+    # Free axes after centred ones that didn't pass the check are no other question.
+    axis = replace(request, axis_wanted=None).ring_axis
+    for name in ("max_projectors", "max_cameras"):
+        del asked[name]
+    return {
+        "mesh": _digest(scene.mesh.vertices, scene.mesh.faces),
+        "rig": _digest(request.rig.to_document()),
+        "seed": _digest(request.seed),
+        "target": _digest(scene.region, scene.steep),
+        "set of requirements": _digest(asked | {"ring_axis": axis}),
+    }
+
+
+def _digest(*parts: object) -> str:
+    sha = hashlib.sha256()
+    for part in parts:
+        if isinstance(part, np.ndarray):
+            sha.update(np.ascontiguousarray(part).tobytes())
+        else:
+            sha.update(json.dumps(part, sort_keys=True).encode())
+    return sha.hexdigest()
+
+
+def _poses(devices: Sequence[Device]) -> NDArray[np.float64]:
+    return np.stack([device.world_from_device for device in devices])
+
+
+def _models(
+    devices: Sequence[PlannedProjector] | Sequence[PlannedCamera],
+    templates: Sequence[PlannedProjector] | Sequence[PlannedCamera],
+) -> NDArray[np.int64]:
+    places = {template.model: place for place, template in enumerate(templates)}
+    return np.array([places[device.model] for device in devices], dtype=np.int64)

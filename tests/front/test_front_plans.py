@@ -1,0 +1,215 @@
+"""A whole front of a small head, and points that are planned from it."""
+
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry.shapes.sample_head.sample_head import sample_head
+from planning import load_rig
+from planning.cameras import camera_cover
+from planning.model.errors import InputError, PlanFileError
+from planning.model.progress import Stopwatch
+from planning.pipeline import plan_rig
+from planning.projectors.candidate_set import CandidateSource
+from planning.rig.wishes import Wishes
+from planning.scene.measured import lit_samples, measured_by
+from planning.steps.front import front_matrix
+from planning.steps.front import plan_front as fronts
+from planning.steps.front.kept_front import FRONT_FILE, read_front
+from planning.steps.front.plan_front import plan_front
+from planning.steps.front.taken_point import TakenPoint
+from planning.steps.prepare import prepared, request_of
+from planning.verify.audit.audit import audit_plan
+
+P, C = 2, 3
+WISHES = Wishes(max_projectors=P, max_cameras=C)
+
+
+@pytest.fixture(scope="module")
+def rig():
+    few = {"n_candidate_projectors": 30, "n_candidate_cameras": 30}
+    return load_rig().replace(placement=few)
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return sample_head(n_faces=3000)
+
+
+@pytest.fixture(scope="module")
+def kept(mesh, rig, with_little_work):
+    with with_little_work():
+        return plan_front(mesh, rig, WISHES, threads=1)
+
+
+@pytest.fixture(scope="module")
+def folder(kept, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("front")
+    with (folder / FRONT_FILE).open("wb") as file:
+        kept.write(file)
+    return folder
+
+
+def share(point, front):
+    return point.measured_m2 / front.area_m2
+
+
+def error(share, n):
+    return np.sqrt(share * (1.0 - share) / n)
+
+
+def test_every_number_is_there_and_more_devices_measure_no_less(kept):
+    front = kept.front
+    counts = [(p, c) for p in range(1, P + 1) for c in range(1, C + 1)]
+    assert [one.count for one in front.points] == counts
+    for one in front.points:
+        assert (len(one.lights), len(one.views)) == one.count
+        for fewer in front.points:
+            if fewer.projectors <= one.projectors and fewer.cameras <= one.cameras:
+                assert fewer.measured_m2 <= one.measured_m2
+        assert one.measured_m2 <= one.reachable_by_cameras_m2 <= one.lit_m2 + 1e-12
+        assert one.lit_m2 <= front.reachable_by_projectors_m2 <= front.area_m2 + 1e-12
+        assert share(one, front) <= front.at_most_share(one)
+    # Two projectors and three cameras of this head measure more than one and one.
+    assert front.points[-1].measured_m2 > 1.2 * front.points[0].measured_m2
+
+
+def test_no_pair_of_candidates_measures_more_than_the_bound_of_one_and_one(
+    kept, mesh, rig
+):
+    """Nor more than is found by much: all cameras beside the brightest projectors."""
+    ready = ready_for(mesh, rig)
+    matrix = kept.matrix(ready)
+    n = len(matrix.target)
+    best = 0
+    brightest = np.argsort(-matrix.candidates.lit.sum(axis=0))[:12]
+    for projector in matrix.candidates.of(brightest):
+        lit = lit_samples(matrix.scene, [projector], matrix.target)
+        measured = measured_by(matrix.scene, matrix.cameras, lit)
+        best = max(best, int(measured.sum(axis=0).max()))
+    one = kept.front.point(1, 1)
+    assert best / n <= one.at_most_m2 / kept.front.area_m2 + 1e-12
+    assert best / n <= share(one, kept.front) + 2 * error(share(one, kept.front), n)
+
+
+def test_what_is_kept_is_what_candidates_light_and_see(kept, folder, mesh, rig):
+    ready = ready_for(mesh, rig)
+    again = read_front(folder).matrix(ready)
+    anew = front_matrix.matrix_of(ready, Stopwatch())
+    np.testing.assert_array_equal(again.candidates.stages, anew.candidates.stages)
+    np.testing.assert_array_equal(again.seen, anew.seen)
+    # Views are made again by arithmetic: every number is the same.
+    scene, target = anew.scene, anew.target
+    offer = camera_cover.camera_candidate_views(
+        scene, ready.cameras, rig.n_camera_poses
+    )
+    fresh = offer.on(target)
+    for one, other in zip(again.views.on(target), fresh, strict=True):
+        np.testing.assert_array_equal(one.samples, other.samples)
+        np.testing.assert_array_equal(one.view.jacobian, other.view.jacobian)
+        np.testing.assert_array_equal(one.view.rays, other.view.rays)
+    assert again.seen.any()
+
+
+@pytest.mark.parametrize("count", [(1, 2), (2, 3)])
+def test_a_taken_point_claims_what_the_front_said_without_a_matrix(
+    count, folder, mesh, rig, monkeypatch, with_little_work
+):
+    def forbidden(*_, **__):
+        raise AssertionError("candidates are looked at again")
+
+    monkeypatch.setattr(CandidateSource, "lattice", forbidden)
+    monkeypatch.setattr(camera_cover, "camera_candidate_views", forbidden)
+    monkeypatch.setattr(front_matrix, "camera_candidate_views", forbidden)
+    monkeypatch.setattr(fronts, "matrix_of", forbidden)
+    front = read_front(folder)
+    point = front.front.point(*count)
+    with with_little_work():
+        plan = plan_rig(
+            mesh,
+            rig,
+            take=TakenPoint(front, point),
+            check=False,
+            on_miss="return",
+            threads=1,
+        )
+    assert (len(plan.projectors), len(plan.cameras)) == count
+    assert (plan.requirements.max_projectors, plan.requirements.max_cameras) == count
+    areas, said = plan.coverage.target, share(point, front.front)
+    claimed = areas.measured_m2 / areas.area_m2
+    draws = 1.0 / front.front.fresh_samples + 1.0 / plan.coverage.samples
+    assert claimed >= said - 3.0 * np.sqrt(said * (1.0 - said) * draws)
+    assert audit_plan(plan).failures == ()
+    projectors = plan.document.certificates.projectors
+    assert projectors.count == count[0]
+    assert projectors.n_samples == front.front.samples
+
+
+def test_a_changed_mesh_rig_seed_or_requirement_is_refused_by_name(folder, mesh, rig):
+    front = read_front(folder)
+    moved = replace_vertices(mesh)
+    other = rig.replace(placement={"n_candidate_projectors": 31})
+    for words, ready in (
+        ("another mesh:", ready_for(moved, rig)),
+        ("another rig:", ready_for(mesh, other)),
+        ("another seed:", ready_for(mesh, rig, seed=1)),
+        ("another target:", ready_for(mesh, rig, target="surface")),
+        ("another set of requirements:", ready_for(mesh, rig, coverage=0.5)),
+    ):
+        with pytest.raises(InputError, match=words) as caught:
+            front.matrix(ready)
+        assert "\n" not in str(caught.value)
+    # How many devices there may be is no matter of the matrix.
+    assert front.matrix(ready_for(mesh, rig, max_cameras=9)).seen.any()
+
+
+def test_the_same_front_with_any_number_of_threads(kept, mesh, rig, with_little_work):
+    with with_little_work():
+        again = plan_front(mesh, rig, WISHES, threads=2)
+    files = [io.BytesIO(), io.BytesIO()]
+    for one, file in zip((kept, again), files, strict=True):
+        one.write(file)
+    assert files[0].getvalue() == files[1].getvalue()
+
+
+def test_damaged_files_are_refused_in_one_line(folder, tmp_path):
+    whole = (folder / FRONT_FILE).read_bytes()
+    path = tmp_path / FRONT_FILE
+    with pytest.raises(InputError, match="no such file; make the front again"):
+        read_front(tmp_path)
+    middle = len(whole) // 2
+    flipped = whole[:middle] + bytes([whole[middle] ^ 255]) + whole[middle + 1 :]
+    for broken in (b"", b"no zip", whole[:middle], flipped):
+        path.write_bytes(broken)
+        with pytest.raises(PlanFileError, match="no front, or a damaged one") as caught:
+            read_front(tmp_path)
+        assert "\n" not in str(caught.value)
+    np.savez(path, head=np.array('{"format": "other"}'))
+    with pytest.raises(PlanFileError, match="damaged"):
+        read_front(tmp_path)
+
+
+def test_ring_frames_are_those_of_each_point(kept):
+    points = kept.front.points
+    total = sum(one.projectors for one in points)
+    assert kept.arrays["point_rings"].shape == (total, 4, 4)
+    last = kept.rings_of(points[-1])
+    np.testing.assert_array_equal(last, kept.arrays["point_rings"][-P:])
+    np.testing.assert_array_equal(
+        kept.rings_of(points[0]), kept.arrays["point_rings"][:1]
+    )
+
+
+def ready_for(mesh, rig, seed=0, **wishes):
+    asked = replace(WISHES, **wishes)
+    clock = Stopwatch()
+    request = request_of(mesh, rig, asked, clock, select=None, weight=None)
+    return prepared(replace(request, seed=seed, threads=1), clock)
+
+
+def replace_vertices(mesh):
+    vertices = mesh.vertices.copy()
+    vertices[0] *= 1.001
+    return replace(mesh, vertices=vertices)
