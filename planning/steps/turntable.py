@@ -64,7 +64,8 @@ def steps_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
     devices as measure enough at all.
 
     Raises:
-        InfeasibleLimitsError: If the devices allowed measure too little at any angle.
+        InfeasibleLimitsError: If the devices allowed measure too little at any angle,
+            or the part can't be turned.
     """
     ready = prepared(request, clock)
     table = request.rig.turntable
@@ -76,6 +77,7 @@ def steps_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
     with clock.stage("turntable", "turntable: what pairs measure at every angle"):
         target = scene.target_samples(DRAWS.cameras)
         room = room_of(scene, lattice, target.samples.points)
+        room.sweep.check(room.still, space)
         scene = room.scene
         sets = TableSets.of(scene, lattice, target)
     search = StepSearch.of(scene, sets, room)
