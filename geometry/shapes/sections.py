@@ -98,15 +98,17 @@ class Sections:
         On one line for all heights, a height `apart` after the one before [m]. Level
         faces count or not.
         """
-        low, high = (r + apart * self.sides.height for r in self.sides.radii)
-        low, high = joined(low, high)
+        least, most = self.sides.radii
+        begin = apart * self.sides.height
+        low, high = joined(least + begin, most + begin)
         inner, outer = self._within(low, high, apart)
-        low, high = np.append(low, inner), np.append(high, outer)
+        low, high = np.concatenate([low, inner]), np.concatenate([high, outer])
         if level:
             least, most = self.level.radii
-            least = np.where(self.through, 0.0, least)
-            low = np.append(low, least + apart * self.level.height)
-            high = np.append(high, most + apart * self.level.height)
+            least = least * ~self.through
+            begin = apart * self.level.height
+            low = np.concatenate([low, least + begin])
+            high = np.concatenate([high, most + begin])
         return joined(low, high)
 
     def _within(self, low: Array, high: Array, apart: float) -> tuple[Array, Array]:

@@ -48,7 +48,8 @@ def in_frame(corners: Array, point: Array, axis: Array) -> Array:
     """Return corners (..., 3) across and along a unit axis through a point."""
     side = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
     side /= np.linalg.norm(side)
-    return (corners - point) @ np.stack([side, np.cross(axis, side), axis]).T
+    rows: Array = np.array([side, np.cross(axis, side), axis], dtype=np.float64)
+    return (corners - point) @ rows.T
 
 
 def deepest_meeting(turning: Array, still: Array, step: float) -> Meeting | None:
