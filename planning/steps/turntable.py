@@ -12,10 +12,10 @@ from geometry.poses import transform
 from planning.cameras.stations.heads.head_poses import PlacedHead
 from planning.cameras.stations.heads.head_stage import stages_of
 from planning.cameras.stations.turntable.fewest_steps import (
-    Steps,
     StepSearch,
     pairs_of_counts,
 )
+from planning.cameras.stations.turntable.standing_steps import Steps
 from planning.cameras.stations.turntable.table_lattice import (
     TableLattice,
     about_axis,
@@ -154,11 +154,14 @@ def _trades(
         with clock.stage("turntable", "turntable: the fewest devices and steps"):
             steps, least = search.fewest(*pair, most)
         rows.append(
-            TradeRow(
-                projectors=pair[0],
-                cameras=pair[1],
-                steps=None if steps is None else len(steps.angles),
-                lower_bound=least,
+            _no_worse(
+                TradeRow(
+                    projectors=pair[0],
+                    cameras=pair[1],
+                    steps=None if steps is None else len(steps.angles),
+                    lower_bound=least,
+                ),
+                rows,
             )
         )
         if steps is not None:
@@ -169,6 +172,23 @@ def _trades(
                 f"{count_words(len(steps.angles), 'step')}, at least {least}"
             )
         yield _Traded(tuple(rows), dict(found))
+
+
+def _no_worse(row: TradeRow, before: Sequence[TradeRow]) -> TradeRow:
+    """What so many devices need: no more steps than fewer, since some may be left out.
+
+    Such a number isn't refuted of any of them.
+    """
+    fewer = [
+        other
+        for other in before
+        if other.projectors <= row.projectors and other.cameras <= row.cameras
+    ]
+    known = [other.steps for other in fewer if other.steps is not None]
+    if not known or (row.steps is not None and row.steps <= min(known)):
+        return row
+    least = min(other.lower_bound for other in (row, *fewer))
+    return row.changed(steps=min(known), lower_bound=least)
 
 
 def _asking_more(scene: Scene, spare: float) -> Scene:
