@@ -2,11 +2,13 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from support.group_rigs import DEVICES, planned, table_rig
 
 from planning.cameras.stations.turntable import table_lattice
 from planning.cameras.stations.turntable.table_sweep import TableSweep
+from planning.model.errors import InfeasibleLimitsError
 from planning.scene.draws import DRAWS
 from planning.verify.audit.audit import audit_plan
 
@@ -38,19 +40,39 @@ _LEVEL = {
 
 
 @pytest.fixture(scope="module")
-def careless(with_little_work):
-    """A plan whose arm hits housings between two places, and the part a pin."""
-    housed = {kind: DEVICES[kind] | {"body": _BODY} for kind in ("projector", "camera")}
-    rig = table_rig(
-        table={"still": ["pin"]}, obstacle=[_ARM, _PIN], workspace=_LEVEL, **housed
-    )
+def few(with_little_work):
+    """Few circles and samples."""
     with pytest.MonkeyPatch.context() as patch, with_little_work():
         patch.setattr(table_lattice, "_CIRCLES", 3)
         patch.setitem(vars(DRAWS), "cameras", replace(DRAWS.cameras, count=500))
+        yield
+
+
+def _level(arm, *others, **table):
+    """A plan of devices that can only stand at mid height, beside an arm."""
+    housed = {kind: DEVICES[kind] | {"body": _BODY} for kind in ("projector", "camera")}
+    rig = table_rig(table=table, obstacle=[arm, *others], workspace=_LEVEL, **housed)
+    asked = {"coverage": 0.3, "dominant_coverage": 0.3}
+    return planned(rig, max_projectors=1, max_cameras=1, **asked)
+
+
+@pytest.fixture(scope="module")
+def careless(few):
+    """A plan whose arm hits housings between two places, and the part a pin."""
+    with pytest.MonkeyPatch.context() as patch:
         patch.setattr(TableSweep, "clears", lambda *_: True)
         patch.setattr(TableSweep, "check", lambda *_: None)
-        asked = {"coverage": 0.3, "dominant_coverage": 0.3}
-        yield planned(rig, max_projectors=1, max_cameras=1, **asked)
+        yield _level(_ARM, _PIN, still=["pin"])
+
+
+@pytest.mark.parametrize("degrees", [0.0, 7.5])
+def test_an_arm_between_two_places_of_the_lattice_leaves_no_room(few, degrees):
+    """Housings stand 15 degrees apart; a thin arm passes all of their circle."""
+    a = np.radians(degrees)
+    there = [500.0 * np.cos(a), 500.0 * np.sin(a), 0.0]
+    arm = _ARM | {"centre_mm": there, "turn_deg": [0.0, 0.0, degrees]}
+    with pytest.raises(InfeasibleLimitsError, match="1 projector and 1 camera"):
+        _level(arm)
 
 
 def test_the_part_and_what_turns_with_it_are_held_against_all_that_stands(careless):
