@@ -16,7 +16,7 @@ import numpy as np
 
 from geometry.arrays import Array, Ints
 
-from .sections import Sections
+from .axis_sections import Sections
 
 # Heights over the size of what turns; and so near to each other at least [m].
 _HEIGHTS, _FINEST_M = 4000, 1e-4

@@ -126,9 +126,9 @@ class StepSearch:
         """A choice of so many angles that is enough.
 
         Of each choice of projectors those of most that any cameras measure come first.
-        Where many of one have no room the others have their turn before it goes on.
+        Where many of one may have no room the others have their turn before it goes on.
         """
-        begin, end = 0, _TURN
+        begin, end = 0, _TRIED if self.room.is_empty else _TURN
         while kept:
             unfinished: list[tuple[Place, ...]] = []
             for lamps in kept:
