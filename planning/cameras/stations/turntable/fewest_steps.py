@@ -167,13 +167,13 @@ class StepSearch:
                 n += crowded
                 if n <= begin:
                     continue
-                if spent.is_over or n > end:
+                if spent.all_tried or n > end:
                     return None, False
                 eyes = tuple(near[k] for k in chosen)
                 if (found := self._stand.enough(lamps, eyes, row)) is not None:
                     return found, True
                 spent.tried += crowded
-            if spent.is_over or n > end:
+            if spent.all_tried or n > end:
                 return None, False
         return None, True
 

@@ -30,9 +30,14 @@ class Spent:
     cut: bool = False
 
     @property
+    def all_tried(self) -> bool:
+        """Whether no more may be tried."""
+        return self.tried >= self.most_tried
+
+    @property
     def is_over(self) -> bool:
         """Whether no more may be looked at, or tried."""
-        return self.looked >= self.most_looked or self.tried >= self.most_tried
+        return self.looked >= self.most_looked or self.all_tried
 
 
 @dataclass(frozen=True, eq=False)
