@@ -24,9 +24,14 @@ def rounded_pose(pose: Array) -> Array:
 
 
 def moved_to(device: _D, world_from_device: Array) -> _D:
-    """Return a device at another pose; the ring frame of a projector moves along."""
+    """Return a device at another pose; the ring frame of a projector moves along.
+
+    One that is the device's own stays so to the last bit: of a code it must be.
+    """
     moved = replace(device, world_from_device=world_from_device)
     if isinstance(moved, PlannedCamera):
         return moved
+    if np.array_equal(moved.world_from_ring, device.world_from_device):
+        return replace(moved, world_from_ring=world_from_device)
     device_from_ring = inverse(device.world_from_device) @ moved.world_from_ring
     return replace(moved, world_from_ring=world_from_device @ device_from_ring)

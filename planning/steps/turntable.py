@@ -12,10 +12,10 @@ from geometry.poses import transform
 from planning.cameras.stations.heads.head_poses import PlacedHead
 from planning.cameras.stations.heads.head_stage import stages_of
 from planning.cameras.stations.turntable.fewest_steps import (
-    Steps,
     StepSearch,
     pairs_of_counts,
 )
+from planning.cameras.stations.turntable.standing_steps import Steps
 from planning.cameras.stations.turntable.table_lattice import (
     TableLattice,
     about_axis,
@@ -23,7 +23,6 @@ from planning.cameras.stations.turntable.table_lattice import (
 )
 from planning.cameras.stations.turntable.table_room import TableRoom, room_of
 from planning.cameras.stations.turntable.table_sets import TableSets
-from planning.cameras.stations.turntable.table_sweep import check_sweep
 from planning.model.device_poses import moved_to
 from planning.model.document.station_records import (
     Placement,
@@ -34,7 +33,6 @@ from planning.model.document.station_records import (
 )
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.progress import Stopwatch
-from planning.model.requirements import Workspace
 from planning.model.words import count_words
 from planning.report.partial_plan import PartialPlan, PlanRequest, Prepared
 from planning.scene.draws import DRAWS
@@ -66,7 +64,8 @@ def steps_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
     devices as measure enough at all.
 
     Raises:
-        InfeasibleLimitsError: If the devices allowed measure too little at any angle.
+        InfeasibleLimitsError: If the devices allowed measure too little at any angle,
+            or the part can't be turned.
     """
     ready = prepared(request, clock)
     table = request.rig.turntable
@@ -75,12 +74,11 @@ def steps_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
     table = table.moved(space.origin_m)
     scene = ready.scene.within(about_axis(space, table))
     lattice = TableLattice.about(table, space, ready.templates, ready.cameras)
-    target = scene.target_samples(DRAWS.cameras)
-    room = room_of(scene, lattice, target.samples.points)
-    scene = room.scene
-    if lattice.n_angles > 1:
-        check_sweep(table, scene.mesh, scene.obstructions, room.still, _floor(space))
     with clock.stage("turntable", "turntable: what pairs measure at every angle"):
+        target = scene.target_samples(DRAWS.cameras)
+        room = room_of(scene, lattice, target.samples.points)
+        room.sweep.check(room.still, space)
+        scene = room.scene
         sets = TableSets.of(scene, lattice, target)
     search = StepSearch.of(scene, sets, room)
     most = min(table.max_steps or lattice.n_angles, lattice.n_angles)
@@ -110,14 +108,6 @@ def steps_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
         if steps is not None:
             partial = _placed(ready, search, traded, taken, clock, steps)
             plan = yield partial, True
-
-
-def _floor(space: Workspace) -> tuple[Array, float] | None:
-    """The direction up, and how high the floor is along it [m]."""
-    if space.floor_m is None:
-        return None
-    up = np.array(space.up)
-    return up, float(np.array(space.centre) @ up) + space.floor_m
 
 
 def _too_little(
@@ -164,11 +154,14 @@ def _trades(
         with clock.stage("turntable", "turntable: the fewest devices and steps"):
             steps, least = search.fewest(*pair, most)
         rows.append(
-            TradeRow(
-                projectors=pair[0],
-                cameras=pair[1],
-                steps=None if steps is None else len(steps.angles),
-                lower_bound=least,
+            _no_worse(
+                TradeRow(
+                    projectors=pair[0],
+                    cameras=pair[1],
+                    steps=None if steps is None else len(steps.angles),
+                    lower_bound=least,
+                ),
+                rows,
             )
         )
         if steps is not None:
@@ -179,6 +172,23 @@ def _trades(
                 f"{count_words(len(steps.angles), 'step')}, at least {least}"
             )
         yield _Traded(tuple(rows), dict(found))
+
+
+def _no_worse(row: TradeRow, before: Sequence[TradeRow]) -> TradeRow:
+    """What so many devices need: no more steps than fewer, since some may be left out.
+
+    Such a number isn't refuted of any of them.
+    """
+    fewer = [
+        other
+        for other in before
+        if other.projectors <= row.projectors and other.cameras <= row.cameras
+    ]
+    known = [other.steps for other in fewer if other.steps is not None]
+    if not known or (row.steps is not None and row.steps <= min(known)):
+        return row
+    least = min(other.lower_bound for other in (row, *fewer))
+    return row.changed(steps=min(known), lower_bound=least)
 
 
 def _asking_more(scene: Scene, spare: float) -> Scene:

@@ -1,5 +1,6 @@
 """The fewest steps of small tables, against every choice of places and angles."""
 
+from dataclasses import replace
 from itertools import combinations, product
 from math import comb
 from types import SimpleNamespace
@@ -148,6 +149,62 @@ def test_a_cut_search_finds_steps_and_claims_no_more_than_it_proved(monkeypatch)
         assert least <= truth <= len(steps.angles)
         assert steps.lower_bound == least
         assert _enough(search, steps.lamps, steps.eyes, steps.angles)
+
+
+class _Crowded(_Room):
+    """Of two cameras there is room where they are on different circles alone.
+
+    And beside the second circle's projector alone.
+    """
+
+    def begins(self, lamps, eyes):
+        apart = len({circle for circle, _ in eyes}) == len(eyes)
+        one = {circle for circle, _ in lamps} == {1}
+        return super().begins(lamps, eyes) if apart and one else np.array([], dtype=int)
+
+
+def _crowded(seed):
+    search = _search(seed, coverage=0.7, hidden=1e-9)
+    return replace(search, room=_Crowded(hidden=search.room.hidden))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_where_cameras_that_measure_most_have_no_room_others_are_drawn(
+    monkeypatch, seed
+):
+    """A cut search finds what there is, and one with few tries what is the fewest."""
+    search = _crowded(seed)
+    truth = _brute(search, 1, 2)
+    module = "planning.cameras.stations.turntable.fewest_steps"
+    assert truth is not None
+    with monkeypatch.context() as patch:
+        patch.setattr(f"{module}._ALL", 1)
+        steps, least = search.fewest(1, 2, ANGLES)
+        assert least <= truth <= len(steps.angles)
+        assert {circle for circle, _ in steps.eyes} == {0, 1}
+        assert _enough(search, steps.lamps, steps.eyes, steps.angles)
+    monkeypatch.setattr(f"{module}._TURN", 2)
+    monkeypatch.setattr(f"{module}._TRIED", 10**5)
+    steps, least = search.fewest(1, 2, ANGLES)
+    assert len(steps.angles) == truth == least == steps.lower_bound
+
+
+def test_turns_that_end_early_leave_no_choice_out(monkeypatch):
+    """Each of all choices is tried once, and refuted is what none of them meets."""
+    search, tried = _search(0, coverage=0.6, hidden=0.15), []
+    module = "planning.cameras.stations.turntable"
+    monkeypatch.setattr(f"{module}.fewest_steps._TURN", 1)
+    monkeypatch.setattr(f"{module}.fewest_steps._LONGER", 2)
+
+    def never(_, lamps, eyes, angles):
+        tried.append((lamps, eyes, tuple(angles)))
+
+    monkeypatch.setattr(f"{module}.standing_steps.StandingSteps.enough", never)
+    monkeypatch.setattr(f"{module}.fewest_steps._TRIED", 10**6)
+    steps, least = search.fewest(1, 2, 3)
+    assert steps is None
+    assert least == 4
+    assert len(tried) == len(set(tried)) > 50
 
 
 def test_devices_stand_where_the_room_lets_them():

@@ -1,105 +1,120 @@
-"""What turns keeps off what stands still, all the way round."""
+"""What turns with a table keeps off what stands still, at every angle of a turn."""
+
+import copy
 
 import numpy as np
 import pytest
-from support.plain_shapes import box
+from support.group_rigs import egg, planned, table_rig
 
-from geometry.mesh.mesh import TriangleMesh
-from planning.cameras.stations.turntable.table_sweep import check_sweep
+from geometry.shapes.boxes import OrientedBox
+from planning.cameras.stations.turntable.table_sweep import TableSweep
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.heads import Turntable
-from planning.scene.placed_bodies import Obstruction
-from planning.verify.audit.stations.sweep_claims import _meets
 
-AXIS, POINT = np.array([0.0, 0.0, 1.0]), np.zeros(3)
-TABLE = Turntable((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-UP = np.array([0.0, 0.0, 1.0])
-# 200 x 40 x 40 mm: it sweeps out to a radius of hypot(100, 20) = 102 mm.
-BAR = box((0.2, 0.04, 0.04), divisions=4)
+# The egg is 100 x 120 x 160 mm: about x, 80 mm reach far, and about z 60.
+_ABOUT_X = {"axis": [1.0, 0.0, 0.0]}
+_PIN = {"name": "pin", "shape": "box", "size_mm": [20.0, 20.0, 20.0]}
 
 
-def at(x, y, z, size=(0.01, 0.01, 0.02)):
-    mesh = box(size)
-    return TriangleMesh(mesh.vertices + np.array([x, y, z]), mesh.faces)
+def _refused(**rig):
+    with pytest.raises(InfeasibleLimitsError) as error:
+        planned(table_rig(**copy.deepcopy(rig)), max_projectors=1, max_cameras=1)
+    return str(error.value)
 
 
-def refused(part, still, turning=(), floor=None):
-    solids = [[Obstruction(n, m, 1e-6) for n, m in some] for some in (turning, still)]
-    try:
-        check_sweep(TABLE, part, *solids, floor)
-    except InfeasibleLimitsError as error:
-        return str(error)
-    return ""
+@pytest.fixture
+def swept(with_little_work, monkeypatch):
+    """Plans that end once it is known what turns."""
+
+    class Clear(Exception):
+        pass
+
+    def end(*_):
+        raise Clear
+
+    module = "planning.steps.turntable.TableSets.of"
+    monkeypatch.setattr(module, end)
+    with with_little_work():
+        yield Clear
+
+
+def test_a_pin_that_the_part_turns_into_is_told_with_angle_and_depth(swept):
+    """At y = 75 the part isn't at angle 0, but 90 degrees later, 5 mm deep."""
+    pin = _PIN | {"centre_mm": [0.0, 85.0, 0.0]}
+    said = _refused(table=_ABOUT_X | {"still": ["pin"]}, obstacle=[pin])
+    assert "the part turns 5.0 mm into obstacle 'pin'" in said
+    angle = float(said.split("turned by ")[1].split()[0])
+    # The end of the egg that is 80 mm off points to the pin: at 90 or 270 degrees.
+    assert abs(angle % 180.0 - 90.0) < 8.0
+    assert "\n" not in said
+
+
+def test_a_pin_inside_the_part_and_one_that_holds_it_are_refused_at_once(swept):
+    for size in (10.0, 400.0):
+        pin = _PIN | {"centre_mm": [0.0, 0.0, 0.0], "size_mm": [size] * 3}
+        assert "obstacle 'pin'" in _refused(table={"still": ["pin"]}, obstacle=[pin])
+
+
+def test_what_turns_with_the_part_keeps_off_as_well(swept):
+    pin = _PIN | {"centre_mm": [0.0, 200.0, -100.0], "size_mm": [20.0, 20.0, 100.0]}
+    arm = {"centre_mm": [150.0, 0.0, -100.0], "size_mm": [200.0, 20.0, 20.0]}
+    arm |= {"name": "arm", "shape": "box"}
+    said = _refused(table={"still": ["pin"]}, obstacle=[pin, arm])
+    assert "obstacle 'arm' turns 20.1 mm into obstacle 'pin'" in said
 
 
 @pytest.mark.parametrize(
-    ("where", "hits"),
+    ("table", "obstacle"),
     [
-        # Beside the bar at angle 0, but where its ends come by.
-        ((0.0, 0.06, 0.0), True),
-        ((0.0, 0.095, 0.0), True),
-        # Its corner passes at 101.98 mm; the pin begins at 103 and at 102.2 mm.
-        ((0.0, 0.108, 0.0), False),
-        ((0.0, 0.1072, 0.0), True),
-        # Above and below, with two millimetres between.
-        ((0.0, 0.05, 0.032), False),
-        ((0.0, 0.05, -0.032), False),
-        # In the hollow of the sweep there is none: the bar holds the axis.
-        ((0.0, 0.0, 0.0), True),
+        ({"still": ["pin"]}, _PIN | {"centre_mm": [0.0, 71.0, 0.0]}),
+        # It stands on it, and its lowest point stays where it is.
+        ({"still": ["pin"]}, {"name": "pin", "shape": "table", "size_mm": [90.0] * 3}),
+        # It is in the part's way, but turns along.
+        ({}, _PIN | {"centre_mm": [0.0, 60.0, 0.0]}),
+        # This table never turns.
+        (_ABOUT_X | {"still": ["pin"], "steps": 1}, _PIN | {"centre_mm": [0, 75, 0]}),
     ],
 )
-def test_a_pin_in_the_way_of_a_bar(where, hits):
-    pin = at(*where)
-    message = refused(BAR, [("pin", pin)])
-    assert bool(message) is hits
-    if hits:
-        assert "obstacle 'pin' stands still" in message
-        assert "\n" not in message
+def test_what_only_touches_or_turns_along_is_left(swept, table, obstacle):
+    with pytest.raises(swept):
+        planned(table_rig(table=table, obstacle=[obstacle]), max_projectors=1)
 
 
-def test_a_part_inside_what_stands_still():
-    assert refused(BAR, [("big", at(0, 0, 0, (0.5, 0.5, 0.5)))])
+def test_a_solid_zone_is_in_the_way_and_forbidden_ground_is_not(swept):
+    zone = _PIN | {"centre_mm": [0.0, 75.0, 0.0]}
+    del zone["shape"]
+    assert "'pin'" in _refused(table=_ABOUT_X, workspace={"keep_out": [zone]})
+    ground = {"keep_out": [zone | {"blocks": False}]}
+    with pytest.raises(swept):
+        planned(table_rig(table=_ABOUT_X, workspace=ground), max_projectors=1)
 
 
-def test_what_is_fastened_to_the_part_turns_too():
-    arm = at(0.2, 0.0, 0.1, (0.2, 0.01, 0.01))
-    pin = at(0.0, 0.25, 0.1)
-    assert not refused(BAR, [("pin", pin)])
-    assert "obstacle 'arm'" in refused(BAR, [("pin", pin)], [("arm", arm)])
+def test_a_wall_that_the_part_turns_through_is_told(swept):
+    """About y its half of 80 mm along z swings out to x."""
+    about_y = {"axis": [0.0, 1.0, 0.0]}
+    low = [-70.0, -2000.0, -2000.0]
+    room = {"shape": "box", "min_mm": low, "max_mm": [2000.0] * 3}
+    said = _refused(table=about_y, workspace=room)
+    assert "10.0 mm into a wall of the room when it has turned by" in said
 
 
-def test_a_part_may_glide_on_a_table_but_not_sink_into_it():
-    top = at(0, 0, -0.03, (0.5, 0.5, 0.02))
-    assert not refused(BAR, [("table", top)])
-    sunk = TriangleMesh(BAR.vertices - [0, 0, 0.002], BAR.faces)
-    assert refused(sunk, [("table", top)])
+def test_a_floor_that_the_part_reaches_through_at_once_binds_devices_alone(swept):
+    about_y = {"axis": [0.0, 1.0, 0.0], "point_mm": [0.0, 0.0, -5.0]}
+    with pytest.raises(swept):
+        planned(table_rig(table=about_y, workspace={"floor_mm": 0.0}), max_projectors=1)
+    said = _refused(table=about_y, workspace={"floor_mm": -81.0})
+    assert "the part turns 9.0 mm into the floor" in said
 
 
-@pytest.mark.parametrize(("floor", "hits"), [(-0.11, False), (-0.09, True)])
-def test_an_axis_that_lies_down_takes_the_part_to_the_floor(floor, hits):
-    table = Turntable((0.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-    if hits:
-        with pytest.raises(InfeasibleLimitsError, match=r"12\.0 mm below the floor"):
-            check_sweep(table, BAR, [], [], (UP, floor))
-    else:
-        check_sweep(table, BAR, [], [], (UP, floor))
-
-
-def test_an_upright_axis_takes_no_part_below_the_floor():
-    check_sweep(TABLE, BAR, [], [], (UP, 0.5))
-
-
-@pytest.mark.parametrize(
-    ("where", "hits"),
-    [((0.0, 0.06, 0.0), True), ((0.0, 0.108, 0.0), False), ((0, 0.05, 0.032), False)],
-)
-def test_the_audit_sees_the_same_by_chords(where, hits):
-    pin = at(*where)
-    met = _meets(BAR, pin, AXIS, POINT) or _meets(pin, BAR, AXIS, POINT)
-    assert met is hits
-
-
-def test_the_audit_sees_a_needle_that_only_turning_points_meet():
-    needle = at(0.0, 0.05, 0.1, (1e-5, 1e-5, 0.19))
-    met = _meets(BAR, needle, AXIS, POINT) or _meets(needle, BAR, AXIS, POINT)
-    assert met
+@pytest.mark.parametrize("degrees", [0.0, 3.75, 7.5])
+def test_a_housing_keeps_off_what_passes_between_two_places(degrees):
+    """A thin arm, at angle 0 beside the housing by any angle."""
+    arm = TableSweep(
+        Turntable((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+        {"arm": egg().corners * [8.0, 0.05, 0.05]},
+    )
+    azimuth = np.radians(90.0 + degrees)
+    out = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+    for radius, room in ((0.38, False), (0.43, True)):
+        solid = OrientedBox(radius * out, np.eye(3), np.full(3, 0.01))
+        assert arm.clears(solid) is room

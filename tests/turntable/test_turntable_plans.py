@@ -10,6 +10,7 @@ from geometry.mesh.mesh import TriangleMesh
 from planning.cameras.stations.heads.head_cover import HeadSets
 from planning.cameras.stations.heads.head_poses import PlacedHead
 from planning.cameras.stations.turntable import table_lattice
+from planning.cameras.stations.turntable.fewest_steps import StepSearch
 from planning.cameras.stations.turntable.table_lattice import TableLattice, about_axis
 from planning.cameras.stations.turntable.table_sets import TableSets
 from planning.model.device_poses import moved_to
@@ -253,6 +254,23 @@ def test_steps_for_other_devices_are_told_and_more_devices_take_no_more(plan):
     row = rows[len(taken.projectors), len(taken.cameras)]
     found = [r.steps for r in rows.values() if r.steps is not None]
     assert row.steps == min(found)
+
+
+def test_more_devices_than_have_room_need_no_more_steps_than_fewer(few, monkeypatch):
+    """What one camera does two do, though of two none were found with room."""
+    fewest = StepSearch.fewest
+
+    def without_two(self, n_lamps, n_eyes, most):
+        if n_eyes == 2:
+            return None, 1
+        return fewest(self, n_lamps, n_eyes, most)
+
+    monkeypatch.setattr(StepSearch, "fewest", without_two)
+    made = planned(table_rig(), max_projectors=1, max_cameras=2, coverage=0.7)
+    one, two = made.document.stations.steps
+    assert (two.cameras, two.steps, two.lower_bound) == (2, one.steps, 1)
+    assert len(made.document.stations.stations[0].cameras) == 1
+    assert audit_plan(made, n_samples=1000).failures == ()
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 The part turns by places of the lattice and takes with it what is fastened to it. Light
 and views of devices meet, at each angle anew, what stands still and the housings of the
-others. A housing keeps off what turns at every place of a turn, in use or not: the
+others. A housing keeps off what turns at every angle of a turn, in use or not: the
 table passes them all.
 """
 
@@ -17,7 +17,6 @@ from geometry.arrays import Array, Ints, Mask
 from geometry.poses import transform
 from geometry.shapes.boxes import OrientedBox
 from planning.proofs.device_stock import within_stock
-from planning.scene.bodies.clearance import lacks_clearance
 from planning.scene.placed_bodies import (
     CLEARANCE_M,
     Device,
@@ -32,6 +31,7 @@ from planning.scene.workspace.admissible import broken_by_body
 
 from .table_lattice import TableLattice
 from .table_sets import Place
+from .table_sweep import TableSweep
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +139,12 @@ class TableRoom:
         return self.lattice.placed(self.lattice.cameras[beyond], place)
 
     @cached_property
+    def sweep(self) -> TableSweep:
+        """What turns with the table."""
+        table, turning = self.lattice.table, self.scene.obstructions
+        return TableSweep.of(self.scene, turning, table)
+
+    @cached_property
     def _turned(self) -> list[Array]:
         """Samples in the room, at each angle."""
         turns = range(self.lattice.n_places)
@@ -160,9 +166,8 @@ class TableRoom:
         every = [self._at(number, k) for k in range(n)]
         if every[0].body is None:
             return np.ones(n, dtype=bool)
-        # As the part sees it, it passes all of the circle.
-        turning = self.scene.within(space.whole_shell)
-        if any(lacks_clearance(turning, one) for one in every):
+        # As the part sees it, it passes all of the circle, wherever on it it stands.
+        if not self.sweep.clears(_box(every[0])):
             return np.zeros(n, dtype=bool)
         return np.array(
             [

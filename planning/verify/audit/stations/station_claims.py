@@ -7,7 +7,6 @@ from planning.verify.audit.audit_findings import AuditFindings
 
 from .head_claims import audit_heads, audit_reference_heads
 from .step_claims import audit_steps
-from .sweep_claims import audit_sweep
 
 
 def audit_stations(case: AuditCase, findings: AuditFindings) -> None:
@@ -21,7 +20,6 @@ def audit_stations(case: AuditCase, findings: AuditFindings) -> None:
     _audit_members(plan, told, below)
     if told.kind == "turntable":
         audit_steps(plan, told, below)
-        audit_sweep(plan, told, below)
     else:
         audit_heads(plan, told, case, below)
     audit_reference_heads(plan, told, below)

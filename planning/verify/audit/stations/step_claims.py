@@ -9,6 +9,8 @@ from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.devices.workspace_claims import turned_back
 from planning.verify.audit.devices.zone_claims import origin_of
 
+from .sweep_claims import audit_sweep
+
 # Poses are written to 0.01 mm, of devices and of what carries them.
 _POSITION_M = 3e-5
 _ROUNDING = 1e-6
@@ -32,6 +34,7 @@ def audit_steps(plan: RigPlan, told: StationsRecord, findings: AuditFindings) ->
             f"{claimed.tolist()} is claimed, the rig's turntable has {list(truth)}",
         )
     _audit_angles(table, told, findings)
+    audit_sweep(plan, told, findings)
     each = table.seconds_per_step
     truth = None if each is None else each * (len(told.stations) - 1)
     slack = _ROUNDING * (1.0 + (truth or 0.0))
