@@ -10,6 +10,7 @@ from support.plain_shapes import grid
 
 from geometry.mesh.mesh import TriangleMesh
 from planning import RigPlan, load_rig, plan_rig, verify_plan
+from planning.cli.declared.plan_checks import check_options
 from planning.cli.main import commands
 from planning.model.errors import InputError, PlanFileError
 from planning.steps.family.family_plan import family_plan, met
@@ -24,6 +25,15 @@ n_candidate_cameras = 60
 n_reference_projectors = 600
 n_reference_cameras = 400
 """
+
+
+# Options of the command line that aren't given.
+_NOTHING = dict.fromkeys(
+    (
+        *("ranges", "unit", "size_mm", "select", "weight", "target", "max_heads"),
+        *("max_projectors", "max_cameras", "pattern", "ring_axis", "poses"),
+    )
+) | {"files": ()}
 
 
 def plate(towards: int, away: float = 0.03) -> TriangleMesh:
@@ -93,7 +103,8 @@ def test_no_plate_is_in_the_way_of_the_other(both):
 
 
 def test_the_share_of_members_that_is_asked_saves_devices(rig, few):
-    half = planned(rig, [plate(1), plate(-1), plate(1, 0.04)], family_quantile=0.6)
+    three = [plate(1), plate(-1), plate(1, 0.04)]
+    half = planned(rig, three, family_quantile=0.6, pattern="dense")
     family = half.document.family
     assert (len(half.projectors), len(half.cameras)) == (1, 1)
     assert family.n_asked == 2
@@ -124,16 +135,20 @@ def test_a_member_may_be_verified_by_itself(kept):
     assert verify_plan(member, check_pixels=False, threads=1).failures == ()
 
 
-def test_one_seed_one_plan_whatever_the_threads(rig, few, both):
-    again = plan_rig(
-        [plate(1), plate(-1)],
-        rig,
-        max_projectors=4,
-        target="surface",
-        check=False,
-        threads=2,
+def test_one_seed_one_plan_whatever_the_threads(rig, few):
+    once, again = (
+        plan_rig(
+            [plate(1), plate(-1)],
+            rig,
+            max_projectors=4,
+            target="surface",
+            pattern="dense",
+            check=False,
+            threads=threads,
+        )
+        for threads in (1, 2)
     )
-    assert again.digest == both.digest
+    assert again.digest == once.digest
 
 
 def _with_family(plan, **changes):
@@ -198,7 +213,7 @@ def test_what_is_false_of_a_family_is_found(both, name):
 
 
 def test_a_member_that_is_another_plan_is_found(both, rig, few):
-    other = planned(rig, [plate(1), plate(-1, 0.05)])
+    other = planned(rig, [plate(1), plate(-1, 0.05)], pattern="dense")
     told = both.document.family
     names = [record.name for record in both.document.members]
     placed = [record.alignment for record in both.document.members]
@@ -259,12 +274,16 @@ def run(*words):
     return CliRunner().invoke(commands, [str(word) for word in words])
 
 
-@pytest.mark.parametrize("given", ["parts", "parts/*"])
-def test_a_folder_or_a_pattern_names_the_members(few, folder, given):
-    out = folder / "out"
+def test_a_folder_and_a_pattern_name_the_same_members(few, folder):
+    out, given = folder / "out", "parts/*"
+    whole = [{"meshes": (str(folder / one),), **_NOTHING} for one in ("parts", given)]
+    for options in whole:
+        check_options(options)
+    assert whole[0]["meshes"] == whole[1]["meshes"]
     ended = run(
         *("--mesh", folder / given, "--max-projectors", 4, "--target", "surface"),
         *("--rig", folder / "few.toml", "--no-check", "--no-patterns", "-o", out),
+        *("--pattern", "dense"),
     )
     assert ended.exit_code == 0, ended.stderr
     assert "each of 2 members" in ended.stdout
