@@ -141,9 +141,10 @@ def as_taken(cover: CandidateCover, chosen: NDArray[np.int64]) -> Selection:
 
 
 def _fewest_known(proof: Certificate) -> bool:
-    """Whether no fewer devices are known to do, so that a bound may prove it."""
+    """Whether these do, and no fewer are known to, so that a bound may prove it."""
     fewer = (row for row in proof.by_count if row.count < proof.count)
-    return all(row.value_m2 < proof.required_m2 for row in fewer)
+    short = all(row.value_m2 < proof.required_m2 for row in fewer)
+    return proof.status != "infeasible" and short
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,12 +197,15 @@ class _Cameras:
     def with_rings(
         self, partial: PartialPlan, cameras: tuple[PlannedCamera, ...]
     ) -> PartialPlan:
-        """Return the plan with other cameras, and ring axes and radii for them."""
+        """Return the plan with other cameras, and ring axes and radii for them.
+
+        Axes have moved for those of the camera stage.
+        """
         partial = replace(partial, cameras=cameras)
         projectors, stage = partial.projectors, partial.camera_stage
         if partial.axes is None:
             return partial
-        if partial.axes == "free":
+        if partial.axes == "free" and cameras is not stage.cameras:
             projectors, stage = self._with_axes_for(projectors, cameras, stage)
         rings = rings_for_pairs(
             self.scene.among((*projectors, *cameras)),
@@ -268,7 +272,7 @@ def _apart(partial: PartialPlan, views: _Cameras, clock: Stopwatch) -> PartialPl
         promised, errors = views.point.sigma_p95_m, _errors(wide)
         if promised is None or errors <= _MORE * promised:
             return wide
-        near = views.with_rings(partial, partial.cameras)
+        near = views.with_rings(partial, stage.cameras)
         if (nearer := _errors(near)) >= errors:
             return wide
         clock.say(
