@@ -13,10 +13,14 @@ from planning.model.errors import InputError, PlanFileError
 from planning.model.progress import Stopwatch
 from planning.pipeline import plan_rig
 from planning.projectors.candidate_set import CandidateSource
+from planning.report.entries.device_entries import rounded_camera, rounded_projector
 from planning.rig.wishes import Wishes
+from planning.scene.draws import DRAWS
 from planning.scene.measured import lit_samples, measured_by
 from planning.steps.front import front_matrix
 from planning.steps.front import plan_front as fronts
+from planning.steps.front.choices import Choice
+from planning.steps.front.fresh_figures import FreshFigures
 from planning.steps.front.kept_front import FRONT_FILE, read_front
 from planning.steps.front.plan_front import plan_front
 from planning.steps.front.taken_point import TakenPoint
@@ -197,6 +201,22 @@ def test_damaged_files_are_refused_in_one_line(folder, tmp_path):
     np.savez(path, head=np.array('{"format": "other"}'))
     with pytest.raises(PlanFileError, match="damaged"):
         read_front(tmp_path)
+
+
+def test_figures_are_of_poses_as_they_are_written(kept, mesh, rig):
+    matrix, point = kept.matrix(ready_for(mesh, rig)), kept.front.point(1, 1)
+    (projector,) = matrix.candidates.of(np.array(point.lights))
+    camera = matrix.cameras[point.views[0]]
+    written = rounded_projector(projector, ""), rounded_camera(camera, "")
+    assert not np.array_equal(camera.world_from_device, written[1].world_from_device)
+    fresh = FreshFigures(matrix)
+    sigmas = [
+        fresh.of(Choice((p,), (c,), point.lights, point.views, None, 0, None)).sigma
+        for p, c in ((projector, camera), written)
+    ]
+    np.testing.assert_array_equal(*sigmas)
+    assert np.isfinite(sigmas[0]).any()
+    assert len(sigmas[0]) == DRAWS.front.count
 
 
 def test_ring_frames_are_those_of_each_point(kept):
