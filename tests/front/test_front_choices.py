@@ -12,8 +12,8 @@ from planning.model.errors import InputError
 from planning.report.partial_plan import PlanRequest
 from planning.rig.wishes import Wishes
 from planning.scene.draws import DRAWS, Draw
+from planning.steps.front.front_points import _at_most, _no_worse
 from planning.steps.front.front_refused import check_front
-from planning.steps.front.plan_front import _at_most, _no_worse
 
 _BODY = {"size_mm": [90.0, 90.0, 150.0], "centre_mm": [0.0, 0.0, -80.0]}
 
