@@ -11,8 +11,9 @@ from planning import load_rig
 from planning.model.errors import InputError
 from planning.report.partial_plan import PlanRequest
 from planning.rig.wishes import Wishes
+from planning.scene.draws import DRAWS, Draw
+from planning.steps.front.front_points import _at_most, _no_worse
 from planning.steps.front.front_refused import check_front
-from planning.steps.front.plan_front import _at_most, _no_worse
 
 _BODY = {"size_mm": [90.0, 90.0, 150.0], "centre_mm": [0.0, 0.0, -80.0]}
 
@@ -69,6 +70,14 @@ def test_the_bound_is_the_less_of_what_is_lit_and_what_is_seen():
     assert _at_most(lit, seen, (2, 1)) == 12
     # Where fewer cameras see all, more see no more.
     assert _at_most(lit, seen, (2, 5)) == 20
+
+
+def test_figures_are_of_a_stream_that_nothing_else_draws():
+    every = {name: d for name, d in vars(DRAWS).items() if isinstance(d, Draw)}
+    own = every.pop("front")
+    # Rounds go a few streams further on.
+    others = {draw.later(k).stream for draw in every.values() for k in range(10)}
+    assert not others & {own.stream, own.later(1).stream}
 
 
 def asked(rig=None, *, cameras_by="both", **wishes):

@@ -13,10 +13,14 @@ from planning.model.errors import InputError, PlanFileError
 from planning.model.progress import Stopwatch
 from planning.pipeline import plan_rig
 from planning.projectors.candidate_set import CandidateSource
+from planning.report.entries.device_entries import rounded_camera, rounded_projector
 from planning.rig.wishes import Wishes
+from planning.scene.draws import DRAWS
 from planning.scene.measured import lit_samples, measured_by
 from planning.steps.front import front_matrix
 from planning.steps.front import plan_front as fronts
+from planning.steps.front.choices import Choice
+from planning.steps.front.fresh_figures import FreshFigures
 from planning.steps.front.kept_front import FRONT_FILE, read_front
 from planning.steps.front.plan_front import plan_front
 from planning.steps.front.taken_point import TakenPoint
@@ -24,7 +28,9 @@ from planning.steps.prepare import prepared, request_of
 from planning.verify.audit.audit import audit_plan
 
 P, C = 2, 3
-WISHES = Wishes(max_projectors=P, max_cameras=C)
+# Less than two projectors light: what a point has must be kept all the same.
+SHARES = {"dominant_coverage": 0.4, "coverage": 0.6}
+WISHES = Wishes(max_projectors=P, max_cameras=C, **SHARES)
 
 
 @pytest.fixture(scope="module")
@@ -134,6 +140,7 @@ def test_a_taken_point_claims_what_the_front_said_without_a_matrix(
             check=False,
             on_miss="return",
             threads=1,
+            **SHARES,
         )
     assert (len(plan.projectors), len(plan.cameras)) == count
     assert (plan.requirements.max_projectors, plan.requirements.max_cameras) == count
@@ -142,6 +149,11 @@ def test_a_taken_point_claims_what_the_front_said_without_a_matrix(
     draws = 1.0 / front.front.fresh_samples + 1.0 / plan.coverage.samples
     assert claimed >= said - 3.0 * np.sqrt(said * (1.0 - said) * draws)
     assert audit_plan(plan).failures == ()
+    # Margins widen, and nothing that the point lights is given up for them.
+    matrix = front.matrix(ready_for(mesh, rig))
+    lit = lit_samples(matrix.scene, plan.projectors, matrix.target)
+    before = matrix.candidates.lit[:, list(point.lights)].any(axis=1)
+    assert len(lit.target) >= before.sum() - 0.001 * len(before)
     projectors = plan.document.certificates.projectors
     assert projectors.count == count[0]
     assert projectors.n_samples == front.front.samples
@@ -189,6 +201,22 @@ def test_damaged_files_are_refused_in_one_line(folder, tmp_path):
     np.savez(path, head=np.array('{"format": "other"}'))
     with pytest.raises(PlanFileError, match="damaged"):
         read_front(tmp_path)
+
+
+def test_figures_are_of_poses_as_they_are_written(kept, mesh, rig):
+    matrix, point = kept.matrix(ready_for(mesh, rig)), kept.front.point(1, 1)
+    (projector,) = matrix.candidates.of(np.array(point.lights))
+    camera = matrix.cameras[point.views[0]]
+    written = rounded_projector(projector, ""), rounded_camera(camera, "")
+    assert not np.array_equal(camera.world_from_device, written[1].world_from_device)
+    fresh = FreshFigures(matrix)
+    sigmas = [
+        fresh.of(Choice((p,), (c,), point.lights, point.views, None, 0, None)).sigma
+        for p, c in ((projector, camera), written)
+    ]
+    np.testing.assert_array_equal(*sigmas)
+    assert np.isfinite(sigmas[0]).any()
+    assert len(sigmas[0]) == DRAWS.front.count
 
 
 def test_ring_frames_are_those_of_each_point(kept):
