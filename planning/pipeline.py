@@ -1,6 +1,6 @@
 """From mesh to checked plan, read top to bottom like the paper's III to VI."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -13,8 +13,8 @@ from planning.model.document.certificates import CamerasBy
 from planning.model.document.family_records import AlignedBy
 from planning.model.document.ring_records import RingAxis
 from planning.model.errors import InputError
-from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
-from planning.model.progress import TIME_IS_UP, Report, Stopwatch
+from planning.model.plan import RequirementError, RigPlan
+from planning.model.progress import Report, Stopwatch
 from planning.report.assemble import write_plan
 from planning.report.live_bar import shown
 from planning.report.partial_plan import PartialPlan, PlanRequest
@@ -25,18 +25,18 @@ from planning.rig.rig import Rig
 from planning.rig.wishes import AccuracyOf, Pattern, TargetName, Wishes
 from planning.scene.interest import Select, Weight
 from planning.scene.ranges.ranged_body import RangedBody
-from planning.verify.verification import Verification, verify_plan
 
+from .steps.asked.request import request_of
 from .steps.best_kept import Keep, Search, best_kept
 from .steps.cameras_alone.stages import planned_alone
 from .steps.carried import devices_of_heads, pattern_of_rig
-from .steps.checked import axes_may_help, missed_by, with_check
+from .steps.checked import Checked, axes_may_help, checked_plan, missed_by
 from .steps.family.family_plan import with_members
 from .steps.family.family_search import family_sought, write_family
 from .steps.front.taken_point import TakenPoint
 from .steps.heads import heads_sought
 from .steps.joint.joining import jointly
-from .steps.prepare import prepared, request_of, standing_devices
+from .steps.prepare import prepared, standing_devices
 from .steps.refused import check_request
 from .steps.stages import (
     bounded_cameras,
@@ -50,8 +50,6 @@ from .steps.stages import (
 from .steps.standing import as_they_stand
 from .steps.surviving import one_more_for_losses, placed_to_survive
 from .steps.turntable import steps_sought
-
-Checked = Callable[[RigPlan, Verification], None]
 
 
 def plan_rig(
@@ -228,13 +226,13 @@ def plan_rig(
             planned = take.planned
         plan, partial = planned(request, clock, keep)
         if check and not plan.document.truncated:
-            plan = _checked(plan, request.threads, clock, keep, checked)
+            plan = checked_plan(plan, request.threads, clock, keep, checked)
             if partial is not None and axes_may_help(plan, partial):
                 clock.say("  centred ring axes don't pass the check: free ones")
                 freed = replace(request, axis_wanted="free")
                 other, partial = planned(freed, clock, keep)
                 if not other.document.truncated:
-                    other = _checked(other, request.threads, clock, keep, checked)
+                    other = checked_plan(other, request.threads, clock, keep, checked)
                     plan = plan if missed_by(other, check=True) else other
     missed = missed_by(plan, check=check)
     if missed and on_miss == "raise":
@@ -254,7 +252,7 @@ def _of_family(
     plan, _ = best_kept(family_sought(request, clock), write_family, clock, keep)
     if check and not plan.document.truncated:
         members = [
-            _checked(member, request.threads, clock, None, checked)
+            checked_plan(member, request.threads, clock, None, checked)
             for member in plan.members
         ]
         plan = with_members(plan, members)
@@ -308,33 +306,3 @@ def _first_plan(request: PlanRequest, clock: Stopwatch) -> PartialPlan:
     if ready.scene.requirements.survival is not None:
         return placed_to_survive(ready, stage, clock)
     return placed(ready, stage, clock)
-
-
-def _checked(
-    plan: RigPlan,
-    threads: int,
-    clock: Stopwatch,
-    keep: Keep | None,
-    checked: Checked | None,
-) -> RigPlan:
-    """Audit the kept plan and reconstruct it from pixels, with foreign code.
-
-    Raises:
-        InterruptedPlanError: If the check is interrupted; it carries the plan as it is.
-    """
-    cut = RigPlan(plan.document.changed(truncated=True), plan.surface)
-    clock.extend()
-    try:
-        if keep is not None:
-            keep(plan)
-        with clock.stage("check", "check: audit, then reconstruction from pixels"):
-            verification = verify_plan(
-                plan, threads=threads, progress=clock.say_in_time
-            )
-    except KeyboardInterrupt:
-        raise InterruptedPlanError(cut) from None
-    except TIME_IS_UP:
-        return cut
-    if checked is not None:
-        checked(plan, verification)
-    return with_check(plan, verification, clock)

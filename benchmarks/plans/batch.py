@@ -92,7 +92,7 @@ def _row(
     words: tuple[str, ...],
     disturb: Callable[[Path, subprocess.Popen[str]], None] = lambda out, batch: None,
 ) -> bool:
-    """Run a batch, and tell how many plans are whole and the same as the first run's."""
+    """Run a batch; tell how many plans are whole, and the same as the first run's."""
     out, begin = place / folder, time.monotonic()
     command = ["batch", str(place / "parts"), "-o", str(out), *_ASKED, *words]
     command += ["--rig", str(place / "few.toml"), "--quiet"]

@@ -1,11 +1,17 @@
 """A plan with what its check found, and what it misses."""
 
-from planning.model.plan import RigPlan
-from planning.model.progress import Stopwatch
+from collections.abc import Callable
+
+from planning.model.plan import InterruptedPlanError, RigPlan
+from planning.model.progress import TIME_IS_UP, Stopwatch
 from planning.report.entries.cost_entry import cost_record
 from planning.report.partial_plan import PartialPlan
 from planning.report.summary.shortfall import shortfalls
-from planning.verify.verification import Verification
+from planning.verify.verification import Verification, verify_plan
+
+from .best_kept import Keep
+
+Checked = Callable[[RigPlan, Verification], None]
 
 
 def with_check(plan: RigPlan, verification: Verification, clock: Stopwatch) -> RigPlan:
@@ -51,3 +57,33 @@ def missed_by(plan: RigPlan, *, check: bool) -> tuple[str, ...]:
     if check and plan.document.reconstruction is None:
         missed += ("the check wasn't made: the time limit came first",)
     return missed
+
+
+def checked_plan(
+    plan: RigPlan,
+    threads: int,
+    clock: Stopwatch,
+    keep: Keep | None,
+    checked: Checked | None,
+) -> RigPlan:
+    """Audit the kept plan and reconstruct it from pixels, with foreign code.
+
+    Raises:
+        InterruptedPlanError: If the check is interrupted; it carries the plan as it is.
+    """
+    cut = RigPlan(plan.document.changed(truncated=True), plan.surface)
+    clock.extend()
+    try:
+        if keep is not None:
+            keep(plan)
+        with clock.stage("check", "check: audit, then reconstruction from pixels"):
+            verification = verify_plan(
+                plan, threads=threads, progress=clock.say_in_time
+            )
+    except KeyboardInterrupt:
+        raise InterruptedPlanError(cut) from None
+    except TIME_IS_UP:
+        return cut
+    if checked is not None:
+        checked(plan, verification)
+    return with_check(plan, verification, clock)

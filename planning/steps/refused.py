@@ -2,9 +2,9 @@
 
 from planning.report.partial_plan import PlanRequest
 
+from .asked.family_request import check_family
 from .cameras_alone.refusals import check_alone
 from .carried import check_carried
-from .family.family_request import check_family
 from .joint.joining import check_joint
 from .surviving import check_survival
 

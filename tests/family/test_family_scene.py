@@ -12,7 +12,7 @@ from planning.proofs.selection import CandidateCover
 from planning.rig.wishes import Wishes
 from planning.scene.draws import Draw
 from planning.scene.family_scene import FamilyScene
-from planning.steps.family.family_request import (
+from planning.steps.asked.family_request import (
     check_members,
     family_of,
     member_names,

@@ -17,6 +17,7 @@ from planning.report.entries.device_entries import rounded_camera, rounded_proje
 from planning.rig.wishes import Wishes
 from planning.scene.draws import DRAWS
 from planning.scene.measured import lit_samples, measured_by
+from planning.steps.asked.request import request_of
 from planning.steps.front import front_matrix
 from planning.steps.front import plan_front as fronts
 from planning.steps.front.choices import Choice
@@ -24,7 +25,7 @@ from planning.steps.front.fresh_figures import FreshFigures
 from planning.steps.front.kept_front import FRONT_FILE, read_front
 from planning.steps.front.plan_front import plan_front
 from planning.steps.front.taken_point import TakenPoint
-from planning.steps.prepare import prepared, request_of
+from planning.steps.prepare import prepared
 from planning.verify.audit.audit import audit_plan
 
 P, C = 2, 3

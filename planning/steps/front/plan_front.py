@@ -14,7 +14,8 @@ from planning.rig.rig import Rig
 from planning.rig.wishes import Wishes
 from planning.scene.interest import Select, Weight
 from planning.scene.ranges.ranged_body import RangedBody
-from planning.steps.prepare import prepared, request_of
+from planning.steps.asked.request import request_of
+from planning.steps.prepare import prepared
 
 from .choices import Chooser
 from .front_matrix import matrix_of
