@@ -1,6 +1,6 @@
 """The one visibility matrix of a front: what every candidate lights and sees."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -87,7 +87,8 @@ def matrix_of(ready: Prepared, clock: Stopwatch) -> FrontMatrix:
             error = NothingLitError(candidates)
             helps = nothing_lit(scene, error) + standing_inside(scene, lattice)
             raise InfeasibleLimitsError(f"{error}; {helps}")
-        good = candidates.of(_good(candidates))
+        most = ready.request.wishes.max_projectors or _SEEDED
+        good = candidates.of(_good(candidates, min(most, _SEEDED)))
         candidates = candidates.extended(source.around(good, len(lattice)))
         offer = camera_candidate_views(scene, ready.cameras, rig.n_camera_poses)
         seen = np.zeros((len(samples), len(offer.cameras)), dtype=bool)
@@ -100,14 +101,14 @@ def matrix_of(ready: Prepared, clock: Stopwatch) -> FrontMatrix:
     return FrontMatrix(candidates, offer.cameras, seen)
 
 
-def _good(candidates: CandidateSet) -> NDArray[np.int64]:
-    """The candidates of a good cover, and the best few."""
-    cover = candidates.cover
+def _good(candidates: CandidateSet, most: int) -> NDArray[np.int64]:
+    """The candidates of a good cover, and the best of each number up to `most`."""
+    cover = replace(candidates.cover, max_count=None)
     good = solve_cover(
         cover.problem, seed=cover.seed, budget=_SEEDS_BUDGET, reduced=cover.reduced
     ).selected
     best = np.arange(cover.n_existing)
-    for count in range(max(1, cover.n_existing), min(_SEEDED, cover.most) + 1):
+    for count in range(max(1, cover.n_existing), min(most, cover.most) + 1):
         best, _ = cover.most_covering(count, best, _SEEDS_BUDGET)
         good = np.union1d(good, best)
     return good
