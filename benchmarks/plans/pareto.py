@@ -37,7 +37,7 @@ ROOT = Path(__file__).parents[2]
 MESHES = ROOT.parent / "shared" / "data" / "meshes"
 UNITS = {"vtk_bunny.ply": "m", "tm_reference.obj": "mm"}
 PROJECTORS, CAMERAS = 3, 4
-POINTS = ((1, 2), (2, 2), (2, 3), (3, 3), (3, 4))
+POINTS = ((2, 3), (3, 3))
 
 
 def main(words: list[str]) -> int:

@@ -25,9 +25,7 @@ from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from solvers import solve_cover
 
-# Counts about whose best projectors of a lattice more candidates are offered.
-_SEEDED = 4
-# Counted work of each such cover.
+# Counted work of the cover about which more candidates are offered.
 _SEEDS_BUDGET = 2e8
 
 
@@ -71,8 +69,7 @@ class FrontMatrix:
 def matrix_of(ready: Prepared, clock: Stopwatch) -> FrontMatrix:
     """Look once at what candidates light and see.
 
-    Around the best projectors of a lattice, of small counts and of the cover that is
-    asked for, there are more candidates.
+    Around those of a lattice that cover what is asked there are more candidates.
 
     Raises:
         InfeasibleLimitsError: If no candidate lights any sample.
@@ -87,8 +84,10 @@ def matrix_of(ready: Prepared, clock: Stopwatch) -> FrontMatrix:
             error = NothingLitError(candidates)
             helps = nothing_lit(scene, error) + standing_inside(scene, lattice)
             raise InfeasibleLimitsError(f"{error}; {helps}")
-        good = candidates.of(_good(candidates))
-        candidates = candidates.extended(source.around(good, len(lattice)))
+        cover = candidates.cover
+        good = solve_cover(cover.problem, seed=cover.seed, budget=_SEEDS_BUDGET)
+        around = source.around(candidates.of(good.selected), len(lattice))
+        candidates = candidates.extended(around)
         offer = camera_candidate_views(scene, ready.cameras, rig.n_camera_poses)
         seen = np.zeros((len(samples), len(offer.cameras)), dtype=bool)
         for column, sight in enumerate(offer.on(samples)):
@@ -98,16 +97,3 @@ def matrix_of(ready: Prepared, clock: Stopwatch) -> FrontMatrix:
             f"cameras on {len(samples):,} samples"
         )
     return FrontMatrix(candidates, offer.cameras, seen)
-
-
-def _good(candidates: CandidateSet) -> NDArray[np.int64]:
-    """The candidates of a good cover, and the best few."""
-    cover = candidates.cover
-    good = solve_cover(
-        cover.problem, seed=cover.seed, budget=_SEEDS_BUDGET, reduced=cover.reduced
-    ).selected
-    best = np.arange(cover.n_existing)
-    for count in range(max(1, cover.n_existing), min(_SEEDED, cover.most) + 1):
-        best, _ = cover.most_covering(count, best, _SEEDS_BUDGET)
-        good = np.union1d(good, best)
-    return good

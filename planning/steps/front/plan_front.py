@@ -74,8 +74,8 @@ def plan_front(
         )
         check_front(request)
         ready = prepared(request, clock)
-        matrix = matrix_of(ready, clock)
         ready = replace(ready, request=replace(request, wishes=wishes))
+        matrix = matrix_of(ready, clock)
         with clock.stage("covers", "front: the best of each number"):
             chooser = Chooser(ready, matrix)
             choices = chooser.choices(clock)
