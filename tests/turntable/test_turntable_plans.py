@@ -13,6 +13,9 @@ from planning.cameras.stations.turntable import table_lattice
 from planning.cameras.stations.turntable.fewest_steps import StepSearch
 from planning.cameras.stations.turntable.table_lattice import TableLattice, about_axis
 from planning.cameras.stations.turntable.table_sets import TableSets
+from planning.handover.export.export_frames import frame_of
+from planning.handover.export.exported_rig import ExportedRig
+from planning.handover.export.sheets.landmarks import Landmarks
 from planning.model.device_poses import moved_to
 from planning.model.errors import (
     InfeasibleLimitsError,
@@ -20,6 +23,7 @@ from planning.model.errors import (
     PlanFileError,
     RigError,
 )
+from planning.model.plan import RigPlan
 from planning.report.summary.brief import brief
 from planning.scene.draws import DRAWS
 from planning.steps.prepare import prepared
@@ -371,3 +375,24 @@ def test_what_cannot_be_asked_of_a_turntable_is_told_in_one_line(tables, asked, 
     with pytest.raises(InputError, match=told) as error:
         planned(table_rig(**tables), **({"max_projectors": 1} | asked))
     assert "\n" not in str(error.value)
+
+
+def test_an_aiming_sheet_knows_what_stands_at_its_step(among):
+    frame = frame_of(None, among.requirements.workspace)
+    rig = ExportedRig.of(among, frame)
+    landmarks, differs = Landmarks(rig), 0
+    for device in rig.devices:
+        for every in (False, True):
+            there = [
+                obstacle
+                for obstacle in among.surface.obstacles
+                if every or obstacle.station in ("", device.planned.station)
+            ]
+            # As if all of these stood there at once.
+            still = tuple(replace(obstacle, station="") for obstacle in there)
+            surface = replace(among.surface, obstacles=still)
+            alone = Landmarks(ExportedRig.of(RigPlan(among.document, surface), frame))
+            same = np.array_equal(alone.seen_by(device), landmarks.seen_by(device))
+            assert same or every
+            differs += not same
+    assert differs

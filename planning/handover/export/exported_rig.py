@@ -181,6 +181,14 @@ class ExportedRig:
     centre: Array
     datums: Array
 
+    def standing_at(self, station: str) -> list[TriangleMesh]:
+        """Return the obstacles that are there where devices of a station measure."""
+        return [
+            self.obstacles[each.name]
+            for each in self.plan.surface.obstacles
+            if each.station in ("", station)
+        ]
+
     @classmethod
     def of(cls, plan: RigPlan, frame: ExportFrame) -> "ExportedRig":
         """Return a plan's devices and object in a frame."""

@@ -26,9 +26,8 @@ class Landmarks:
         mesh = rig.mesh
         self.vertices = mesh.vertices
         self._curvedness = np.nan_to_num(principal_curvatures(mesh).curvedness)
-        self._mesh = mesh
-        solid = TriangleMesh.joined([mesh, *rig.obstacles.values()])
-        self._caster = RayCaster(solid, threads=1)
+        self._mesh, self._rig = mesh, rig
+        self._casters: dict[str, RayCaster] = {}
         self._short = _SHORT * mesh.radius
 
     def seen_by(self, device: ExportedDevice) -> Ints:
@@ -62,8 +61,16 @@ class Landmarks:
         seen &= self._facing(device) > _LEAST_FACING
         rows = np.flatnonzero(seen)
         reach = np.maximum(far[rows] - self._short, 0.0)
-        seen[rows] = ~self._caster.occluded(starts[rows], along[rows], reach)
+        caster = self._among(device.planned.station)
+        seen[rows] = ~caster.occluded(starts[rows], along[rows], reach)
         return seen
+
+    def _among(self, station: str) -> RayCaster:
+        """The object among what stands there when devices of a station measure."""
+        if station not in self._casters:
+            solids = [self._mesh, *self._rig.standing_at(station)]
+            self._casters[station] = RayCaster(TriangleMesh.joined(solids), threads=1)
+        return self._casters[station]
 
     def _facing(self, device: ExportedDevice) -> Array:
         """Return how squarely the best face of each vertex is met, a cosine, (n_v,)."""
