@@ -243,9 +243,9 @@ def test_a_signal_while_a_plan_is_saved_costs_no_second_saving(
             "which has no projector",
         ),
         (
-            ["--mesh", "FACE", "--mesh", "FACE", "--max-projectors", 3],
+            ["--mesh", "FACE", "--mesh", "FACE", "--max-projectors", 3, "--size-mm", 9],
             2,
-            "isn't built yet|aren't built yet",
+            "--size-mm with 2 meshes",
         ),
         (
             ["--mesh", "FACE", "--max-projectors", 3, "--unit", "mm", "--size-mm", 3],
@@ -307,7 +307,7 @@ def test_a_signal_while_a_plan_is_saved_costs_no_second_saving(
         (["FACE"], 2, "--max-projectors"),
         (["no.obj", "--max-projectors", 3], 3, "no.obj: no such file"),
         (["--max-projectors", 3, "no.obj"], 3, "no.obj: no such file"),
-        (["FACE", "--mesh", "FACE", "--max-projectors", 3], 2, "aren't built yet"),
+        (["FACE", "--mesh", "FACE", "--max-projectors", 3, "--select", "x"], 3, "one"),
         (["verify", "no.json"], 3, "no such file"),
         (["verify", "."], 3, r"plan\.json: no such file"),
         (["reconstruct", "."], 3, r"plan\.json: no such file"),

@@ -374,8 +374,3 @@ def test_a_plate_without_curvature_has_no_dominant_region():
 def test_impossible_accuracy_is_named_as_the_limit_that_forbids(quick):
     with pytest.raises(InfeasibleLimitsError, match=r"sigma 100 %.*--accuracy"):
         quick(accuracy_mm=1e-9)
-
-
-def test_several_meshes_are_refused_until_they_are_built(head):
-    with pytest.raises(InputError, match="isn't built yet"):
-        plan_rig([head, head], load_rig("default"), max_projectors=3)

@@ -6,9 +6,6 @@ from typing import Any
 
 import click
 
-from geometry.files.archives import is_mesh_name
-from geometry.files.formats import SUPPORTED
-
 
 def check_options(options: dict[str, Any]) -> None:
     """Join the meshes that were given, and refuse options that exclude each other.
@@ -59,6 +56,10 @@ def _files(given: str) -> list[str]:
     Raises:
         click.UsageError: If a folder or a pattern holds none.
     """
+    # `plan --help` needs no readers.
+    from geometry.files.archives import is_mesh_name
+    from geometry.files.formats import SUPPORTED
+
     # os.path answers for names that the system refuses; Path raises.
     if os.path.isdir(given):
         names = sorted(os.listdir(given))
