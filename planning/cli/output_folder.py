@@ -127,7 +127,9 @@ def _is_ours(entry: Path) -> bool:
     if entry.name == "patterns":
         return is_patterns(entry)
     if entry.name == "members":
-        return all((member / "plan.json").is_file() for member in entry.iterdir())
+        return entry.is_dir() and all(
+            (member / "plan.json").is_file() for member in entry.iterdir()
+        )
     return entry.name in OWNED
 
 

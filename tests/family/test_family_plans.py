@@ -12,6 +12,7 @@ from geometry.mesh.mesh import TriangleMesh
 from planning import RigPlan, load_rig, plan_rig, verify_plan
 from planning.cli.declared.plan_checks import check_options
 from planning.cli.main import commands
+from planning.cli.output_folder import exchanged
 from planning.model.errors import InputError, PlanFileError
 from planning.steps.family.family_plan import family_plan, met
 
@@ -314,3 +315,28 @@ def test_a_family_that_cant_be_is_one_line(folder, monkeypatch, words, told):
     ended = run(*words)
     assert ended.exit_code in (2, 3)
     assert told in ended.stderr
+
+
+def test_a_family_takes_the_place_of_another_and_no_strangers(both, kept, tmp_path):
+    for turn in range(2):
+        with exchanged(tmp_path) as fresh:
+            both.save(fresh / "plan.json")
+        plan = RigPlan.load(tmp_path / "plan.json")
+        assert len(plan.members) == 2, turn
+    with exchanged(tmp_path) as fresh:
+        both.members[0].save(fresh / "plan.json")
+    assert not (tmp_path / "members").exists()
+    (tmp_path / "members").mkdir()
+    (tmp_path / "members" / "mine.txt").write_text("a stranger's")
+    with pytest.raises(FileExistsError, match="members"), exchanged(tmp_path):
+        pass
+
+
+def test_the_current_folder_may_hold_no_members(both, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with exchanged(tmp_path) as fresh:
+        both.members[0].save(fresh / "plan.json")
+    assert (tmp_path / "plan.json").exists()
+    with exchanged(tmp_path) as fresh:
+        both.save(fresh / "plan.json")
+    assert len(RigPlan.load(tmp_path / "plan.json").members) == 2
