@@ -65,7 +65,9 @@ def with_obstacle() -> RigPlan:
     mesh = TriangleMesh(wall.vertices + [0.2, 0.0, 0.5], wall.faces)
 
     def change(document):
-        document["rig"]["obstacle"] = [{"name": "wall"}]
+        document["rig"]["obstacle"] = [
+            {"name": "wall", "shape": "mesh", "centre_mm": [0.0, 0.0, 0.0]}
+        ]
         room = {"name": "room", "centre_m": [0.0, 0.0, 0.0], "half_m": [1.5, 1.5, 1.5]}
         room["axes"] = np.eye(3).tolist()
         document["requirements"]["workspace"]["box"] = room
