@@ -74,7 +74,7 @@ def test_projectors_beyond_the_fewest_stand_where_they_are_allowed(
     # Two light four sides of six, three all of them.
     small = ((0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1))
     scene, stage, _ = planned((*BIG, *small), 0.0, **asked)
-    monkeypatch.setattr(stages, "prove_fewest", lambda *_: stage)
+    monkeypatch.setattr(stages, "proved_projectors", lambda *_: stage)
     request = SimpleNamespace(prove=False, least_projectors=least)
     ready = SimpleNamespace(request=request, scene=scene, templates=())
     found = stages.bounded_projectors(ready, stage, Stopwatch())
