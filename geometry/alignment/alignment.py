@@ -119,6 +119,8 @@ def _by_icp(first: TriangleMesh, points: Array, start: Array) -> Array:
     Besl and McKay, "A method for registration of 3-D shapes", PAMI 1992; trimesh's own
     loop asks another library for the closest points.
     """
+    # It takes long to import, and few runs need it.
+
     pose, error = start, np.inf
     for _ in range(_STEPS):
         near = closest_points(first, _moved(points, pose))

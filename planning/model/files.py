@@ -7,6 +7,8 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
+from geometry.parallel import mapped
+
 from .errors import InputError
 
 
@@ -39,19 +41,26 @@ def write_together(files: Mapping[Path, Callable[[BinaryIO], object]]) -> None:
     """Write files that belong to each other; none is moved before all are complete.
 
     Args:
-        files: For each path what receives the open binary file; folders must exist.
+        files: For each path what receives the open binary file, several at a time;
+            folders must exist.
     """
+    umask = os.umask(0)
+    os.umask(umask)
     with ExitStack() as undo:
-        complete: list[tuple[str, Path]] = []
-        for path, write in files.items():
-            handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-            undo.callback(Path(name).unlink, missing_ok=True)
-            with os.fdopen(handle, "wb") as file:
-                write(file)
+        names: dict[Path, str] = {}
+        for path in files:
+            handle, names[path] = tempfile.mkstemp(
+                dir=path.parent, prefix=f".{path.name}."
+            )
+            os.close(handle)
+            undo.callback(Path(names[path]).unlink, missing_ok=True)
+
+        def fill(path: Path) -> None:
+            with open(names[path], "wb") as file:
+                files[path](file)
             # mkstemp lets only the owner read; give what a plain open would have given.
-            umask = os.umask(0)
-            os.umask(umask)
-            os.chmod(name, 0o666 & ~umask)
-            complete.append((name, path))
-        for name, path in complete:
+            os.chmod(names[path], 0o666 & ~umask)
+
+        mapped(fill, files)
+        for path, name in names.items():
             os.replace(name, path)

@@ -8,11 +8,12 @@ import numpy as np
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples
-from geometry.parallel import n_threads
+from geometry.parallel import abandonable, n_threads
 from planning.model.errors import InputError
 from planning.model.plan import RigPlan
 from planning.model.words import count_words
-from planning.verify.audit.audit import Audit, audit_plan
+from planning.verify.audit.audit import Audit, audited
+from planning.verify.audit.audit_case import AuditCase, examine
 from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.coverage.prediction import possible_at_floors
 from planning.verify.audit.figure_claims import compare_figures, contradictions
@@ -173,19 +174,29 @@ def verify_plan(
     threads = threads or n_threads()
     seed = plan.document.seed if seed is None else seed
     say("audit: recomputing every claim on fresh samples")
-    audit = audit_plan(plan, seed=seed, threads=threads)
-    failures, other = list(audit.failures), None
+    case = examine(plan, seed=seed, threads=threads)
+    other, differs = None, list[str]()
     if mesh is not None:
         differs = compare_meshes(mesh, plan.surface.mesh)
-        failures += differs
         if differs and comparable(mesh, plan.surface.mesh):
             other = mesh
     recorded = plan.document.reconstruction
-    failures += contradictions(recorded, plan.requirements.check)
+    differs += contradictions(recorded, plan.requirements.check)
     if not check_pixels:
-        return Verification(tuple(failures), audit, None)
+        audit = audited(case)
+        return Verification((*audit.failures, *differs), audit, None)
     how = {"photometry": photometry, "physics": physics}
-    pixels = _reconstruct(plan, audit, truth, other, seed, threads, say, how)
+    # Pixels need what was recomputed, and no claim.
+    with abandonable(1) as pool:
+        auditing = pool.submit(audited, case)
+        try:
+            pixels = _reconstruct(plan, case, truth, other, seed, threads, say, how)
+        except Exception:
+            # Of a plan without meaning that is said, and not how it can't be rendered.
+            auditing.result()
+            raise
+        audit = auditing.result()
+    failures = [*audit.failures, *differs]
     if truth is not None or other is not None or any(how.values()):
         # What is recorded is of the rig as planned, by the built-in renderer.
         return Verification((*failures, *pixels.failures), audit, pixels)
@@ -223,7 +234,7 @@ def _verify_family(
 
 def _reconstruct(
     plan: RigPlan,
-    audit: Audit,
+    case: AuditCase,
     truth: RigPlan | None,
     mesh: TriangleMesh | None,
     seed: int,
@@ -239,7 +250,7 @@ def _reconstruct(
     standing = None if truth is None and mesh is None else Scanner.of(truth or plan)
     if standing is not None and mesh is not None:
         standing = replace(standing, mesh=mesh)
-    case, believed = audit.case, Scanner.of(plan)
+    believed = Scanner.of(plan)
     samples = bare(case.samples)
     expected = Expected(samples, case.actual.measured, case.actual.by_pair)
     told = countdown(

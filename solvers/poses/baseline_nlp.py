@@ -1,17 +1,17 @@
 """The program of ``baseline_program`` in CasADi, one of its own for each problem."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from .baseline_problem import BaselineProblem
+from .baseline_rows import Formula, Rows, StackedRows, kind_of
 
 _Array = NDArray[np.float64]
-_Matrix = ca.SX | ca.DM
 
 _MEAN_WEIGHT = 0.05
 _THIN = 1e-6
@@ -30,14 +30,16 @@ class BaselineProgram:
             what each limit gives way by, and what camera 1 gains at each E, (n, 1).
         objective: f.
         constraints: g.
+        derivatives: Functions `jac_g` and `hess_lag` as `casadi.nlpsol` takes them.
         low: Lower bounds of g.
         high: Upper bounds of g.
         start: Where to start.
     """
 
-    x: ca.SX
-    objective: ca.SX
-    constraints: ca.SX
+    x: ca.MX
+    objective: ca.MX
+    constraints: ca.MX
+    derivatives: dict[str, ca.Function]
     low: _Array
     high: _Array
     start: _Array
@@ -45,251 +47,370 @@ class BaselineProgram:
 
 def build_baseline_program(problem: BaselineProblem) -> BaselineProgram:
     """State the program."""
-    k, begin = len(problem.centres), problem.centres.ravel()
-    x, looks = ca.SX.sym("x", 3 * k + 1), np.append(problem.aims, problem.rolls)
-    t, free, gives = x[3 * k], ca.SX(looks), _Slacks(problem)
-    if problem.elastic:
-        free = ca.SX.sym("looks", 4 * k)
-    aims, rolls = ca.reshape(free[: 3 * k], 3, k).T, free[3 * k :]
-    cameras = _Cameras(problem, ca.reshape(x[: 3 * k], 3, k).T, aims, rolls)
-    stated, covering = _Stated(), _Stated()
-    apart = _norm(
-        _rows(cameras.centres, problem.pairs[:, 0])
-        - _rows(cameras.centres, problem.pairs[:, 1])
-    )
-    if not problem.elastic:
-        stated.add(apart - t)
-    _state_workspace(stated, problem, cameras.centres)
+    names = _Variables(problem)
+    blocks = [*_apart(names), *_workspace(names)]
     if len(problem.seams.points):
-        _state_seams(covering, problem, cameras)
-    if len(problem.kept.camera):
-        _state_kept(covering, problem, cameras, gives.lifts)
-    every = ca.vertcat(x, free, gives.slack, gives.gain) if problem.elastic else x
-    start = np.append(begin, problem.smallest_baseline)
-    if problem.weights is not None:
-        first = np.full(len(problem.weights), _SLACK), np.zeros(len(problem.reserves))
-        start = np.concatenate([start, looks, *first])
-        start[3 * k] = 0.0
-        moved = ca.vertcat(x[: 3 * k] - begin, free[: 3 * k] - looks[: 3 * k])
-        objective = ca.dot(ca.DM(problem.weights), gives.slack)
-        turned = ca.sumsqr(rolls - problem.rolls)
-        objective += _NEAR * (ca.sumsqr(moved) / problem.max_step**2 + turned)
-    else:
-        covering.admit(every, start)
-        objective = -t - _MEAN_WEIGHT * ca.sum1(apart) / len(problem.pairs)
+        blocks.append(_seams(names))
+    kept = list(_kept(names)) if len(problem.kept.camera) else []
+    start = names.start
+    first = sum(block.n_rows for block in blocks)
+    rows = StackedRows((*blocks, *kept), *_lifted(names, kept, first))
+    blocks += kept
+    bounds = [block.bounds(start) for block in blocks]
+    x = ca.MX.sym("x", names.n)
+    weights = ca.MX.sym("lambda", rows.constant.size)
+    scale, none = ca.MX.sym("sigma"), ca.MX.sym("p", 0)
+    constraints = rows.values(x)
+    objective, own, of_own = _objective(names, x)
+    jacobian = rows.jacobian(x)
+    # The mean of the baselines is of the same rows as the least.
+    lambdas = weights
+    if not problem.elastic:
+        n = len(problem.pairs)
+        lambdas = ca.vertcat(weights[:n] - scale * _MEAN_WEIGHT / n, weights[n:])
+    hessian = rows.hessian(x, lambdas, scale * ca.DM(own), of_own)
+    derivatives = {
+        "jac_g": ca.Function(
+            "jac_g", [x, none], [constraints, jacobian], ["x", "p"], ["g", "jac_g_x"]
+        ),
+        "hess_lag": ca.Function(
+            "hess_lag",
+            [x, none, scale, weights],
+            [hessian],
+            ["x", "p", "lam_f", "lam_g"],
+            ["triu_hess_gamma_x_x"],
+        ),
+    }
     return BaselineProgram(
-        every,
+        x,
         objective,
-        ca.vertcat(*stated.g, *covering.g),
-        np.concatenate(stated.low + covering.low),
-        np.concatenate(stated.high + covering.high),
+        constraints,
+        derivatives,
+        np.concatenate([low for low, _ in bounds]),
+        np.concatenate([high for _, high in bounds]),
         start,
     )
 
 
-@dataclass
-class _Stated:
-    g: list[ca.SX] = field(default_factory=list)
-    low: list[_Array] = field(default_factory=list)
-    high: list[_Array] = field(default_factory=list)
-
-    def add(self, g: _Matrix, low: float = 0.0, high: float = np.inf) -> None:
-        n = g.numel()
-        self.g.append(ca.SX(g))
-        self.low.append(np.full(n, low))
-        self.high.append(np.full(n, high))
-
-    def admit(self, x: ca.SX, start: _Array) -> None:
-        """Let what is past a limit at the start stay there, but get no worse."""
-        if self.g:
-            g = ca.Function("g", [x], [ca.vertcat(*self.g)])
-            now = np.asarray(g(start), dtype=np.float64).ravel()
-            self.low = [np.minimum(np.concatenate(self.low), now)]
-            self.high = [np.maximum(np.concatenate(self.high), now)]
-
-
 @dataclass(frozen=True, eq=False)
-class _Slacks:
-    """What limits give way by; at an end of a part what camera 1 gains there, too."""
+class _Variables:
+    """Which variables of x are what."""
 
     problem: BaselineProblem
 
-    @cached_property
-    def alone(self) -> ca.SX:
-        n_ends = len(self.problem.reserves)
-        return ca.SX.sym("alone", len(self.problem.kept.camera) - 2 * n_ends)
-
-    @cached_property
-    def ended(self) -> ca.SX:
-        return ca.SX.sym("ended", len(self.problem.reserves))
-
-    @cached_property
-    def gain(self) -> ca.SX:
-        return ca.SX.sym("gain", len(self.problem.reserves))
+    @property
+    def k(self) -> int:
+        return len(self.problem.centres)
 
     @property
-    def slack(self) -> ca.SX:
-        return ca.vertcat(self.alone, self.ended)
+    def t(self) -> int:
+        return 3 * self.k
 
     @property
-    def lifts(self) -> ca.SX:
-        """What is added to the margins of kept points."""
-        if not self.problem.elastic:
-            return ca.SX.zeros(len(self.problem.kept.camera))
-        first = -self.gain - ca.DM(self.problem.reserves)
-        return ca.vertcat(self.alone, first, self.gain + self.ended)
+    def n(self) -> int:
+        return len(self.start)
+
+    @property
+    def n_ends(self) -> int:
+        return len(self.problem.reserves)
+
+    @property
+    def slacks(self) -> int:
+        """The first of what limits give way by."""
+        return 7 * self.k + 1
+
+    @property
+    def n_alone(self) -> int:
+        """How many kept points are at no end of a part."""
+        return len(self.problem.kept.camera) - 2 * self.n_ends
+
+    def centres(self, cameras: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Those of O_c, shape (m, 3)."""
+        return 3 * cameras[:, None] + np.arange(3)
+
+    def poses(self, cameras: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Those of O_c, the aim and the roll, shape (m, 7)."""
+        k, aims = self.k, 3 * self.k + 1
+        rolls = aims + 3 * k + cameras[:, None]
+        centres = self.centres(cameras)
+        return np.concatenate([centres, aims + centres, rolls], axis=1)
+
+    @property
+    def start(self) -> _Array:
+        problem = self.problem
+        begin = problem.centres.ravel()
+        if problem.weights is None:
+            return np.append(begin, problem.smallest_baseline)
+        slacks = np.full(len(problem.weights), _SLACK)
+        looks = np.append(problem.aims, problem.rolls)
+        return np.concatenate([begin, [0.0], looks, slacks, np.zeros(self.n_ends)])
 
 
-@dataclass(frozen=True, eq=False)
-class _Cameras:
-    """Cameras by their centres and aims, (k, 3) each, and rolls, (k, 1)."""
+def _objective(names: _Variables, x: ca.MX) -> tuple[ca.MX, _Array, NDArray[np.int64]]:
+    """Return f; and of its Hessian what isn't of the pairs, a diagonal, and where."""
+    problem, start = names.problem, names.start
+    if problem.weights is None:
+        one, two = (names.centres(problem.pairs[:, i]) for i in range(2))
+        apart = ca.reshape(
+            x[one.ravel().tolist()] - x[two.ravel().tolist()], 3, len(one)
+        )
+        baselines = ca.sqrt(ca.sum1(apart**2))
+        mean = ca.sum2(baselines) / len(problem.pairs)
+        nothing = np.zeros(0)
+        return -x[names.t] - _MEAN_WEIGHT * mean, nothing, nothing.astype(np.int64)
+    n_moved = 3 * names.k
+    moving = np.append(np.arange(n_moved), n_moved + 1 + np.arange(4 * names.k))
+    # Centres and aims by the step, rolls in [rad].
+    near = np.full(moving.size, _NEAR / problem.max_step**2)
+    near[2 * n_moved :] = _NEAR
+    moved = x[moving.tolist()] - ca.DM(start[moving])
+    slacks = x[names.slacks : names.slacks + len(problem.weights)]
+    objective = ca.dot(ca.DM(problem.weights), slacks)
+    objective += ca.dot(ca.DM(near), moved**2)
+    return objective, 2.0 * near, moving
 
-    problem: BaselineProblem
-    centres: _Matrix
-    aims: _Matrix
-    rolls: _Matrix
 
-    @cached_property
-    def axes(self) -> _Matrix:
-        return _unit(self.aims - self.centres)
+def _lifted(
+    names: _Variables, kept: list[Rows], first: int
+) -> tuple[sparse.csc_array, _Array]:
+    """What is added to the margins of kept points, whose rows begin at `first`.
 
-    @cached_property
-    def sides(self) -> tuple[_Matrix, _Matrix]:
-        """The image's own x and y, each (k, 3): `look_at`, turned by the roll."""
-        z, ups = self.axes, self.problem.ups
-        if ups is None:
-            ups = np.tile(self.problem.shell.up, (z.shape[0], 1))
-        level = _unit(_cross(z, ca.DM(ups)))
-        down = _cross(z, level)
-        c, s = (ca.repmat(f(self.rolls), 1, 3) for f in (ca.cos, ca.sin))
-        return c * level + s * down, c * down - s * level
+    A limit gives way by its slack; at an end of a part camera 1 leaves its reserve and
+    what it gains to camera 2, whose own limits give way.
+    """
+    n_rows = first + sum(block.n_rows for block in kept)
+    constant = np.zeros(n_rows)
+    if not names.problem.elastic or not kept:
+        return sparse.csc_array((n_rows, names.n)), constant
+    n_ends, n_alone = names.n_ends, names.n_alone
+    end, gain = np.arange(n_ends), names.slacks + n_alone + n_ends
+    # Of each kept point up to two columns with their signs, and a constant.
+    columns = np.full((n_alone + 2 * n_ends, 2), -1)
+    signs, lifts = np.ones(columns.shape), np.zeros(len(columns))
+    firsts = slice(n_alone, n_alone + n_ends)
+    columns[:n_alone, 0] = names.slacks + np.arange(n_alone)
+    columns[firsts, 0], signs[firsts, 0] = gain + end, -1.0
+    lifts[firsts] = -names.problem.reserves
+    both = gain + end, names.slacks + n_alone + end
+    columns[n_alone + n_ends :] = np.column_stack(both)
+    point = np.concatenate(
+        [
+            np.repeat(of_point, block.kind.n_values)
+            for block, of_point in zip(kept, _kept_points(names), strict=False)
+        ]
+    )
+    constant[first:] = lifts[point]
+    row, side = np.nonzero(columns[point] >= 0)
+    at = first + row, columns[point][row, side]
+    matrix = sparse.csc_array((signs[point][row, side], at), shape=(n_rows, names.n))
+    return matrix, constant
 
 
-def _state_workspace(
-    stated: _Stated, problem: BaselineProblem, centres: _Matrix
-) -> None:
-    shell = problem.shell
-    k = len(problem.centres)
-    every = centres - ca.repmat(ca.DM(shell.centre).T, k, 1)
+def _kept_points(names: _Variables) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Kept points, and those of them at which rings bind."""
+    kept = names.problem.kept
+    ringed = np.flatnonzero(np.any(kept.ring_normals != 0.0, axis=1))
+    return np.arange(len(kept.camera)), ringed
+
+
+def _apart(names: _Variables) -> Iterator[Rows]:
+    """Yield |O_a - O_b| >= t of pairs; of an elastic program there are none."""
+    problem = names.problem
+    if problem.elastic:
+        return
+    one, two = (names.centres(problem.pairs[:, i]) for i in range(2))
+    t = np.full((len(one), 1), names.t)
+    yield _rows(_apart_formula, np.concatenate([one, two, t], axis=1))
+
+
+def _apart_formula(v: ca.SX, q: ca.SX) -> ca.SX:
+    return ca.norm_2(v[:3] - v[3:6]) - v[6]
+
+
+def _workspace(names: _Variables) -> Iterator[Rows]:
+    problem, shell = names.problem, names.problem.shell
+    every = np.arange(names.k)
     # What stays may stand anywhere: the workspace holds the others.
-    free = np.setdiff1d(np.arange(k), problem.fixed)
-    offset = _rows(every, free) if problem.fixed else every
-    distance = _norm(offset)
+    free = names.centres(np.setdiff1d(every, problem.fixed))
     low, high = shell.radius
     # A shell thinner than this is a sphere, and an equation suits IPOPT better.
     thin = high - low < _THIN * high
-    stated.add(distance, *((0.5 * (low + high),) * 2 if thin else (low, high)))
-    if shell.half_angle < np.pi:
-        stated.add(offset @ ca.DM(shell.axis) - np.cos(shell.half_angle) * distance)
-    if shell.floor is not None:
-        stated.add(offset @ ca.DM(shell.up), shell.floor)
+    radius = (0.5 * (low + high),) * 2 if thin else (low, high)
+    if len(free):
+        yield _rows(_distance_formula, free, shell.centre, *radius)
+        if shell.half_angle < np.pi:
+            cone = *shell.centre, *shell.axis, np.cos(shell.half_angle)
+            yield _rows(_cone_formula, free, np.array(cone))
+        if shell.floor is not None:
+            yield _rows(
+                _along_formula, free, np.append(shell.centre, shell.up), shell.floor
+            )
     held = problem.half_spaces
     if len(held.camera):
-        along = _dot(_rows(every, held.camera), ca.DM(held.normals))
-        stated.add(along - ca.DM(held.offsets))
+        centre = np.tile(shell.centre, (len(held.camera), 1))
+        data = np.concatenate([centre, held.normals], axis=1)
+        places = names.centres(held.camera)
+        yield _rows(_along_formula, places, data, held.offsets[:, None])
     # Squared, since the distance from the start has no derivative at the start.
-    stated.add(
-        ca.sum2((centres - ca.SX(problem.centres)) ** 2), 0.0, problem.max_step**2
-    )
+    places, most = names.centres(every), problem.max_step**2
+    yield _rows(_square_formula, places, problem.centres, 0.0, most)
 
 
-def _state_seams(stated: _Stated, problem: BaselineProblem, cameras: _Cameras) -> None:
+def _distance_formula(v: ca.SX, q: ca.SX) -> ca.SX:
+    return ca.norm_2(v - q)
+
+
+def _cone_formula(v: ca.SX, q: ca.SX) -> ca.SX:
+    offset = v - q[:3]
+    return ca.dot(offset, q[3:6]) - q[6] * ca.norm_2(offset)
+
+
+def _along_formula(v: ca.SX, q: ca.SX) -> ca.SX:
+    return ca.dot(v - q[:3], q[3:6])
+
+
+def _square_formula(v: ca.SX, q: ca.SX) -> ca.SX:
+    return ca.sumsqr(v - q)
+
+
+def _seams(names: _Variables) -> Rows:
     """Camera 2 has left at E what camera 1 gives up there, and vice versa."""
-    left1, left2 = _seam_margins(problem, cameras.centres, cameras.axes)
-    now1, _ = _seam_margins(
-        problem, ca.DM(problem.centres), _unit(ca.DM(problem.aims - problem.centres))
+    problem, seams = names.problem, names.problem.seams
+    one, two = seams.cameras.T
+    data = np.concatenate(
+        [
+            *(seams.points, seams.outward, seams.onward, seams.turn[:, None]),
+            *(seams.half_fields, problem.aims[one], problem.aims[two]),
+            np.full((len(one), 1), problem.max_incidence),
+        ],
+        axis=1,
     )
-    reserve = ca.fmin(*now1)
-    for first in left1:
-        for second in left2:
-            stated.add(first - reserve + second)
+    places = np.concatenate([names.centres(one), names.centres(two)], axis=1)
+    now = _rows(_left_formula, places, data).at(names.start)
+    data = np.concatenate([data, now[:, :2].min(axis=1, keepdims=True)], axis=1)
+    return _rows(_seam_formula, places, data, admitted=True)
 
 
-def _seam_margins(
-    problem: BaselineProblem, centres: _Matrix, axes: _Matrix
-) -> tuple[tuple[_Matrix, _Matrix], tuple[_Matrix, _Matrix]]:
-    """Return theta - iota_i and b_i - beta_i of both cameras at every seam point."""
-    seams = problem.seams
-    points, turn = ca.DM(seams.points), ca.DM(seams.turn)
+def _left_formula(v: ca.SX, q: ca.SX) -> ca.SX:
+    """Return theta - iota_i and b_i - beta_i of both cameras at a seam point, (4,)."""
+    point, outward, onward, turn = q[:3], q[3:6], q[6:9], q[9]
+    half1, half2, aim1, aim2, theta = q[10], q[11], q[12:15], q[15:18], q[18]
 
-    def bearing(v: _Matrix) -> _Matrix:
-        return ca.atan2(_dot(v, ca.DM(seams.onward)), _dot(v, ca.DM(seams.outward)))
+    def bearing(u: ca.SX) -> ca.SX:
+        return ca.atan2(ca.dot(u, onward), ca.dot(u, outward))
 
-    one, two = seams.cameras[:, 0], seams.cameras[:, 1]
-    at1 = bearing(_rows(centres, one) - points)
-    at2 = bearing(_rows(centres, two) - points)
-    back1, back2 = bearing(-_rows(axes, one)), bearing(-_rows(axes, two))
-    theta, half = problem.max_incidence, ca.DM(seams.half_fields)
-    return (
-        (theta + at1, half[:, 0] - back1 + at1),
-        (theta - at2 + turn, half[:, 1] - at2 + back2),
+    one, two = v[:3], v[3:6]
+    at1, at2 = bearing(one - point), bearing(two - point)
+    back1, back2 = bearing(-_unit(aim1 - one)), bearing(-_unit(aim2 - two))
+    return ca.vertcat(
+        theta + at1, half1 - back1 + at1, theta - at2 + turn, half2 - at2 + back2
     )
 
 
-def _state_kept(
-    stated: _Stated, problem: BaselineProblem, cameras: _Cameras, lifts: ca.SX
-) -> None:
-    kept = problem.kept
-    ray = ca.DM(kept.points) - _rows(cameras.centres, kept.camera)
-    distance = _norm(ray)
-    for margin in _view_margins(problem, cameras, ray, distance):
-        stated.add(margin + lifts)
-    ringed = np.flatnonzero(np.any(kept.ring_normals != 0.0, axis=1))
+def _seam_formula(v: ca.SX, q: ca.SX) -> ca.SX:
+    left, reserve = _left_formula(v, q[:19]), q[19]
+    return ca.vertcat(
+        *(left[i] - reserve + left[j] for i in range(2) for j in range(2, 4))
+    )
+
+
+def _kept(names: _Variables) -> Iterator[Rows]:
+    """Yield what incidence, range, the image and rings leave at kept points."""
+    problem, kept = names.problem, names.problem.kept
+    camera, admitted = kept.camera, not problem.elastic
+    shared = np.array(
+        [*problem.sides.ravel(), np.cos(problem.max_incidence), *problem.range_m]
+    )
+    ups = problem.ups
+    ups = np.tile(problem.shell.up, (names.k, 1)) if ups is None else ups
+    looks = np.column_stack([problem.aims, problem.rolls])
+    data = np.concatenate(
+        [
+            *(kept.points, kept.normals, ups[camera]),
+            np.tile(shared, (len(camera), 1)),
+        ],
+        axis=1,
+    )
+    if problem.elastic:
+        yield _rows(_view_formula, names.poses(camera), data)
+    else:
+        data = np.concatenate([data, looks[camera]], axis=1)
+        yield _rows(_held_view_formula, names.centres(camera), data, admitted=admitted)
+    _, ringed = _kept_points(names)
     if len(ringed):
-        for margin in _ring_margins(problem, _rows(ray, ringed), ringed):
-            stated.add(margin + lifts[ringed.tolist()])
+        m, normal = kept.ring_normals[ringed], kept.normals[ringed]
+        none = np.zeros(len(camera))
+        factors = (none if f is None else f for f in (kept.sigma, kept.pitch))
+        data = np.column_stack(
+            [
+                *(kept.points[ringed], m, normal, np.einsum("ij,ij->i", m, normal)),
+                np.full(len(ringed), problem.min_conditioning),
+                *(factor[ringed] for factor in factors),
+            ]
+        )
+        places = names.centres(camera[ringed])
+        yield _rows(_ring_formula, places, data, admitted=admitted)
 
 
-def _view_margins(
-    problem: BaselineProblem, cameras: _Cameras, ray: _Matrix, distance: _Matrix
-) -> Iterator[_Matrix]:
-    """Yield what incidence, range and the four sides of the image leave."""
-    kept, (near, far) = problem.kept, problem.range_m
-    yield -_dot(ray, ca.DM(kept.normals)) / distance - np.cos(problem.max_incidence)
-    yield distance / near - 1.0
-    yield 1.0 - distance / far
-    depth = _dot(ray, _rows(cameras.axes, kept.camera)) / distance
-    for low, high, across in zip(*problem.sides, cameras.sides, strict=True):
-        aside = _dot(ray, _rows(across, kept.camera)) / distance
-        yield (aside - low * depth) / np.hypot(1.0, low)
-        yield (high * depth - aside) / np.hypot(1.0, high)
+def _held_view_formula(v: ca.SX, q: ca.SX) -> ca.SX:
+    """The same of a camera whose aim and roll stay."""
+    return _view_formula(ca.vertcat(v, q[16:20]), q[:16])
 
 
-def _ring_margins(
-    problem: BaselineProblem, ray: _Matrix, ringed: NDArray[np.int64]
-) -> Iterator[_Matrix]:
-    """Yield what |r.m|, s_N and ring pitch leave."""
-    kept = problem.kept
-    m, normal = kept.ring_normals[ringed], kept.normals[ringed]
-    distance = _norm(ray)
-    along = _dot(ray, ca.DM(m)) / distance
-    facing = -_dot(ray, ca.DM(normal)) / distance
-    yield along - problem.min_conditioning
-    slant = np.einsum("ij,ij->i", m, normal)
-    square = along**2 + facing**2 + 2.0 * along * facing * ca.DM(slant)
+def _view_formula(v: ca.SX, q: ca.SX) -> ca.SX:
+    """What incidence, range and the four sides of the image leave."""
+    centre, aim, roll = v[:3], v[3:6], v[6]
+    point, normal, up = q[:3], q[3:6], q[6:9]
+    low, high, cosine, near, far = q[9:11], q[11:13], q[13], q[14], q[15]
+    ray = point - centre
+    distance = ca.norm_2(ray)
+    margins = [
+        -ca.dot(ray, normal) / distance - cosine,
+        distance / near - 1.0,
+        1.0 - distance / far,
+    ]
+    z = _unit(aim - centre)
+    level = _unit(ca.cross(z, up))
+    down = ca.cross(z, level)
+    c, s = ca.cos(roll), ca.sin(roll)
+    depth = ca.dot(ray, z) / distance
+    across = c * level + s * down, c * down - s * level
+    for least, most, side in zip(
+        ca.vertsplit(low), ca.vertsplit(high), across, strict=True
+    ):
+        aside = ca.dot(ray, side) / distance
+        margins.append((aside - least * depth) / ca.sqrt(1.0 + least**2))
+        margins.append((most * depth - aside) / ca.sqrt(1.0 + most**2))
+    return ca.vertcat(*margins)
+
+
+def _ring_formula(v: ca.SX, q: ca.SX) -> ca.SX:
+    """What |r.m|, s_N and ring pitch leave."""
+    point, m, normal, slant, least = q[:3], q[3:6], q[6:9], q[9], q[10]
+    ray = point - v
+    distance = ca.norm_2(ray)
+    along, facing = ca.dot(ray, m) / distance, -ca.dot(ray, normal) / distance
+    square = along**2 + facing**2 + 2.0 * along * facing * slant
     # v is null only where ring and surface are parallel; keep the root smooth there.
     spread = distance * ca.sqrt(square + _SMOOTH)
-    for coefficient, needed in ((kept.sigma, along), (kept.pitch, facing)):
-        if coefficient is not None:
-            yield needed - spread * ca.DM(coefficient[ringed])
+    return ca.vertcat(along - least, along - spread * q[11], facing - spread * q[12])
 
 
-def _rows(matrix: _Matrix, index: NDArray[np.int64]) -> _Matrix:
-    return matrix[[int(i) for i in index], :]
+def _unit(a: ca.SX) -> ca.SX:
+    return a / ca.norm_2(a)
 
 
-def _dot(a: _Matrix, b: _Matrix) -> _Matrix:
-    return ca.sum2(a * b)
-
-
-def _norm(a: _Matrix) -> _Matrix:
-    return ca.sqrt(ca.sum2(a * a))
-
-
-def _unit(a: _Matrix) -> _Matrix:
-    return a / ca.repmat(_norm(a), 1, 3)
-
-
-def _cross(a: _Matrix, b: _Matrix) -> _Matrix:
-    columns = ((1, 2), (2, 0), (0, 1))
-    return ca.horzcat(*(a[:, i] * b[:, j] - a[:, j] * b[:, i] for i, j in columns))
+def _rows(
+    formula: Formula,
+    places: NDArray[np.int64],
+    data: _Array | None = None,
+    low: _Array | float = 0.0,
+    high: float = np.inf,
+    *,
+    admitted: bool = False,
+) -> Rows:
+    """Return rows of a formula; data of one row are those of all."""
+    data = np.zeros(0) if data is None else data
+    data = np.broadcast_to(data, (len(places), data.shape[-1]))
+    kind = kind_of(formula, places.shape[1], data.shape[1])
+    return Rows(kind, places, data, np.asarray(low), np.asarray(high), admitted)

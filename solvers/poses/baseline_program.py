@@ -133,7 +133,8 @@ def _run_ipopt(
             "error_on_fail": False,
             # The gradient by parameters, of which there are none.
             "no_nlp_grad": True,
-        },
+        }
+        | program.derivatives,
     )
     least, most = _bounds(problem, program.start)
     return run_solver(

@@ -1,10 +1,12 @@
 """Dominant regions for a person: where they lie, what of them is lit and measured."""
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from geometry.mesh.mesh import TriangleMesh
 from planning.model.document.coverage_records import RegionCoverage, RegionRecord
 from planning.model.plan import RigPlan
 from planning.model.words import area_words, count_words, labelled, percent
@@ -200,10 +202,9 @@ def region_place(plan: RigPlan, region: RegionRecord) -> str:
         return ""
     up = np.array(plan.requirements.workspace.up)
     mesh, place = plan.surface.mesh, np.array(region.centre_m)
-    heights, height = mesh.vertices @ up, float(place @ up)
-    low, high = float(heights.min()), float(heights.max())
+    height = float(place @ up)
+    low, high, width = _extent(mesh, tuple(up.tolist()))
     across = (place - mesh.centre) - ((place - mesh.centre) @ up) * up
-    width = np.ptp(mesh.vertices - heights[:, None] * up, axis=0).max()
     beside = np.linalg.norm(across) > _MIDDLE * width
     side = f"towards {_direction(across, up)}" if beside else "about the middle"
     facing = f"facing {_direction(region.mean_normal, up)}"
@@ -212,6 +213,14 @@ def region_place(plan: RigPlan, region: RegionRecord) -> str:
     third = ("bottom", "middle", "top")[min(int(3 * (height - low) / (high - low)), 2)]
     above = f"{1e3 * (height - low):.0f} mm above the lowest point"
     return f", {third} third, {side}, {above}, {facing}"
+
+
+@lru_cache(maxsize=1)
+def _extent(mesh: TriangleMesh, up: tuple[float, ...]) -> tuple[float, float, float]:
+    """Lowest and highest point of a mesh along up, and its width across [m]."""
+    heights = mesh.vertices @ np.array(up)
+    across = mesh.vertices - heights[:, None] * np.array(up)
+    return float(heights.min()), float(heights.max()), float(np.ptp(across, 0).max())
 
 
 def _direction(vector: ArrayLike, up: ArrayLike) -> str:

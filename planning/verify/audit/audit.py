@@ -49,7 +49,7 @@ from planning.verify.audit.rings.axis_claims import audit_ring_axes
 from planning.verify.audit.rings.ring_claims import audit_rings
 from planning.verify.audit.stations.station_claims import audit_stations
 
-from .audit_case import AuditCase, examine
+from .audit_case import N_SAMPLES, AuditCase, examine
 from .audit_findings import AuditFindings
 
 _CLAIMS = (
@@ -140,7 +140,11 @@ class Audit:
 
 
 def audit_plan(
-    plan: RigPlan, *, seed: int = 0, n_samples: int = 20_000, threads: int | None = None
+    plan: RigPlan,
+    *,
+    seed: int = 0,
+    n_samples: int = N_SAMPLES,
+    threads: int | None = None,
 ) -> Audit:
     """Recompute every claim of a plan from its document and its surface alone.
 
@@ -151,8 +155,16 @@ def audit_plan(
         PlanFileError: If the plan is broken, so that its claims have no meaning.
     """
     threads = threads or n_threads()
-    case = examine(plan, seed=seed, n_samples=n_samples, threads=threads)
-    findings = AuditFindings()
+    return audited(examine(plan, seed=seed, n_samples=n_samples, threads=threads))
+
+
+def audited(case: AuditCase) -> Audit:
+    """Hold every claim of a plan against what was recomputed of it.
+
+    Raises:
+        PlanFileError: If the plan is broken, so that its claims have no meaning.
+    """
+    findings, plan = AuditFindings(), case.plan
     alone = plan.requirements.pattern == "none"
     for audit_claims in _CLAIMS_OF_VIEWS if alone else _CLAIMS:
         audit_claims(case, findings)

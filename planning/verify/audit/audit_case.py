@@ -25,6 +25,9 @@ from planning.verify.audit.predicates.recompute import Reachable, Recomputed
 from .audit_samples import AuditSamples, draw_samples
 from .estimates import Estimator
 
+# Of the target, drawn afresh.
+N_SAMPLES = 20_000
+
 
 @dataclass(frozen=True, eq=False)
 class DeviceKind:
@@ -159,7 +162,9 @@ class AuditCase:
         )
 
 
-def examine(plan: RigPlan, *, seed: int, n_samples: int, threads: int) -> AuditCase:
+def examine(
+    plan: RigPlan, *, seed: int, threads: int, n_samples: int = N_SAMPLES
+) -> AuditCase:
     """Recompute what a plan's devices and reference poses do to fresh samples."""
     samples = draw_samples(plan.surface, plan.requirements.target, n_samples, seed)
     shadow = Shadow.of(plan, threads=threads)

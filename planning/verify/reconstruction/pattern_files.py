@@ -8,7 +8,8 @@ import json
 from collections.abc import Callable, Sequence
 from functools import cache, partial
 from pathlib import Path
-from typing import Any, BinaryIO
+from threading import Lock
+from typing import Any, BinaryIO, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,7 @@ from planning.verify.reconstruction.patterns.ring_patterns import Frame
 from .scanner import Scanner
 
 FOLDER = "patterns"
+_Made = TypeVar("_Made")
 _MANIFEST = "sequence.json"
 _SECTION = "ringrig-patterns"
 _NOTES = {
@@ -80,8 +82,7 @@ def pattern_contents(
     entries: list[dict[str, Any]] = []
     for p, projector in enumerate(scanner.projectors):
         frames = scanner.frames(p)
-        # Once a projector, and not before a file is written.
-        drawer = cache(partial(drawn_by, projector, scanner.cameras))
+        drawer = _once(partial(drawn_by, projector, scanner.cameras))
         for frame in frames:
             path = f"{projector.id}/{frame.name}.png"
             files[path] = _png_writer(drawer, frame)
@@ -157,6 +158,17 @@ def _manifest(folder: Path) -> dict[str, Any]:
     except (OSError, ValueError):
         return {}
     return manifest if isinstance(manifest, dict) else {}
+
+
+def _once(make: Callable[[], _Made]) -> Callable[[], _Made]:
+    """Return what makes something when it is first asked, for all threads once."""
+    lock, made = Lock(), cache(make)
+
+    def answer() -> _Made:
+        with lock:
+            return made()
+
+    return answer
 
 
 def _png_writer(

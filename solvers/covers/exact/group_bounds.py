@@ -101,9 +101,9 @@ class PartBounds:
 
     def _stepped(self, parts: list[GroupPart]) -> list[GroupPart]:
         weights, aim = self._weights, 0.998 * self._target
+        costliest = _Costliest(parts, self.n_sets)
         shares = np.stack([part.shares for part in parts]).astype(np.float64)
-        best, (bounds, chosen) = shares, self._bounds(parts, shares)
-        taken = self._indicator(chosen)
+        best, (bounds, taken) = shares, self._bounds(costliest, shares)
         primal = np.stack([part.primal for part in parts]).astype(np.float64)
         fresh = np.array([not part.costliest.size for part in parts])
         primal = np.where(fresh[:, None], taken, primal)
@@ -117,8 +117,8 @@ class PartBounds:
             length = np.maximum((excess * excess * moving) @ weights, 1e-9)
             far = np.maximum(bounds - aim, 1e-4 * self._total)
             shares = np.clip(best + (step * far / length)[:, None] * excess, 0.0, 1.0)
-            values, chosen = self._bounds(parts, shares)
-            primal = _MEMORY * primal + (1.0 - _MEMORY) * self._indicator(chosen)
+            values, taken = self._bounds(costliest, shares)
+            primal = _MEMORY * primal + (1.0 - _MEMORY) * taken
             lower = values < bounds
             best = np.where(lower[:, None], shares, best)
             bounds = np.minimum(bounds, values)
@@ -132,7 +132,7 @@ class PartBounds:
                 part,
                 shares=best[i].astype(np.float32),
                 primal=primal[i].astype(np.float32),
-                costliest=chosen[i],
+                costliest=np.flatnonzero(taken[i]),
                 bound=min(part.bound, float(bounds[i])),
                 pace=(float(step[i]), int(stale[i])),
             )
@@ -140,36 +140,52 @@ class PartBounds:
         ]
 
     def _bounds(
-        self, parts: list[GroupPart], shares: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], list[NDArray[np.int64]]]:
+        self, costliest: "_Costliest", shares: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Bounds (p,), and which sets the costliest selections take, (p, n_s)."""
         steps = np.floor(shares * (self._weights / self._grid))
         payments = steps.astype(np.float32) @ self.covers.T
         self._budget.spend(
-            2.0 * len(parts) * self.covers.size * _DENSE_UNIT
+            2.0 * len(shares) * self.covers.size * _DENSE_UNIT
             + _CHOOSE * payments.size
             + 1e5
         )
-        pairs = zip(parts, payments, strict=True)
-        chosen = [self._costliest(part, row) for part, row in pairs]
-        sums = zip(payments, chosen, strict=True)
-        paid = np.array([row[sets].sum(dtype=np.float64) for row, sets in sums])
-        return self._total + self._grid * (paid - steps.sum(axis=1)), chosen
+        taken = costliest.at(payments)
+        paid = np.sum(payments, axis=1, where=taken, dtype=np.float64)
+        return self._total + self._grid * (paid - steps.sum(axis=1)), taken
 
-    def _costliest(
-        self, part: GroupPart, payments: NDArray[np.float32]
-    ) -> NDArray[np.int64]:
-        picks = [int(group[np.argmax(payments[group])]) for group in part.groups]
-        spare = self.n_sets - len(picks)
-        if spare == 0:
-            return np.array(picks, dtype=np.int64)
-        others = np.where(part.closed, np.float32(-1.0), payments)
-        others[picks] = -1.0
-        top = np.argpartition(-others, min(spare, others.size) - 1)[:spare]
-        top = top[others[top] > 0.0]
-        return np.concatenate([np.array(picks, dtype=np.int64), top])
 
-    def _indicator(self, chosen: list[NDArray[np.int64]]) -> NDArray[np.float64]:
-        taken = np.zeros((len(chosen), len(self.covers)))
-        for row, sets in zip(taken, chosen, strict=True):
-            row[sets] = 1.0
+class _Costliest:
+    """The costliest selections of parts, found together at ever new payments."""
+
+    def __init__(self, parts: list[GroupPart], n_sets: int) -> None:
+        self._closed = np.stack([part.closed for part in parts])
+        n_groups = np.array([len(part.groups) for part in parts])
+        self._spare = n_sets - n_groups
+        groups = [group for part in parts for group in part.groups]
+        sizes = np.array([len(group) for group in groups], dtype=np.int64)
+        # All groups in one row: their sets, and of which part and group each is.
+        self._sets = np.concatenate([np.empty(0, dtype=np.int64), *groups])
+        self._part = np.repeat(np.arange(len(parts)), n_groups)
+        self._rows = np.repeat(self._part, sizes)
+        self._starts, self._sizes = np.cumsum(sizes) - sizes, sizes
+
+    def at(self, payments: NDArray[np.float32]) -> NDArray[np.bool_]:
+        """Return which sets they take, shape (p, n_s); payments have that shape."""
+        taken = np.zeros(payments.shape, dtype=bool)
+        if len(self._starts):
+            paid = payments[self._rows, self._sets]
+            most = np.maximum.reduceat(paid, self._starts)
+            best = np.flatnonzero(paid == np.repeat(most, self._sizes))
+            first = best[np.searchsorted(best, self._starts)]
+            taken[self._part, self._sets[first]] = True
+        others = np.where(self._closed | taken, np.float32(-1.0), payments)
+        for spare in np.unique(self._spare[self._spare > 0]):
+            rows = np.flatnonzero(self._spare == spare)
+            some = others[rows]
+            last = min(int(spare), some.shape[1]) - 1
+            top = np.argpartition(-some, last, axis=1)[:, :spare]
+            costs = np.take_along_axis(some, top, axis=1)
+            row, column = np.nonzero(costs > 0.0)
+            taken[rows[row], top[row, column]] = True
         return taken

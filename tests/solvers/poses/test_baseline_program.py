@@ -368,6 +368,19 @@ def _check_derivatives(problem):
     for i, unit in enumerate(np.eye(len(x))):
         change = np.array(value(x + step * unit) - value(x - step * unit)).ravel()
         np.testing.assert_allclose(exact[:, i], change / (2 * step), atol=1e-7)
+    given = np.array(ca.densify(program.derivatives["jac_g"](x, [])[1]))
+    np.testing.assert_allclose(given, exact[1:], atol=1e-12)
+    _check_hessian(program, x)
+
+
+def _check_hessian(program, x):
+    """What is put together from kinds of rows is what CasADi makes of the whole."""
+    scale, weights = 0.7, np.random.default_rng(1).normal(size=len(program.low))
+    lagrangian = scale * program.objective + ca.dot(weights, program.constraints)
+    whole = ca.Function("h", [program.x], [ca.hessian(lagrangian, program.x)[0]])
+    given = program.derivatives["hess_lag"](x, [], scale, weights)
+    expected = np.triu(np.array(ca.densify(whole(x))))
+    np.testing.assert_allclose(np.array(ca.densify(given)), expected, atol=1e-10)
 
 
 def test_seam_rows_are_what_the_signed_angles_leave():

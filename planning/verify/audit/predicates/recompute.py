@@ -8,6 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from geometry.arrays import Array, Ints, Mask
+from geometry.parallel import mapped
 from planning.model.plan import RigPlan
 from planning.model.requirements import Requirements
 from planning.verify.audit.audit_samples import AuditSamples
@@ -33,6 +34,8 @@ from .reference_devices import reference_cameras, reference_projectors
 
 _NOT_LIT = -1
 _Device = TypeVar("_Device")
+# Samples that go to a thread together.
+_PART = 2000
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,13 +210,19 @@ def _furthest(
 ) -> Steps:
     """Most limits that any device passes on wanted samples, 0 on others, (n,)."""
     furthest = np.zeros(len(wanted), dtype=np.int8)
-    waiting = np.flatnonzero(wanted)
-    for index in rng.permutation(len(devices)):
-        if len(waiting) == 0:
-            break
-        steps = steps_of(devices[index], waiting)
-        furthest[waiting] = np.maximum(furthest[waiting], steps)
-        waiting = waiting[steps < every]
+    order = rng.permutation(len(devices))
+
+    def search(waiting: Ints) -> None:
+        for index in order:
+            if len(waiting) == 0:
+                break
+            steps = steps_of(devices[index], waiting)
+            furthest[waiting] = np.maximum(furthest[waiting], steps)
+            waiting = waiting[steps < every]
+
+    # Each sample is looked at by itself: no result depends on the parts.
+    every_one = np.flatnonzero(wanted)
+    mapped(search, np.array_split(every_one, 1 + len(every_one) // _PART))
     return furthest
 
 
