@@ -54,7 +54,7 @@ class ByHand:
         wanted = np.where(scene.region >= 0, mesh.area_faces, 0.0)
         points, faces = trimesh.sample.sample_surface(
             mesh, _POINTS, face_weight=wanted, seed=0
-        )
+        )[:2]
         normals, steep = mesh.face_normals[faces], scene.steep[faces]
         space = limits.workspace
         radius = float(np.mean(space.projector_radius_m))

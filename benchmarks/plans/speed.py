@@ -142,7 +142,7 @@ def _run(mesh: Path, place: Path, words: Sequence[str], cache: Path | None) -> R
         for line in process.stderr:
             if "NOT CHECKED yet" in line:
                 stands = time.monotonic() - begin
-        used = _waited(process)
+        used = waited(process)
     ends = time.monotonic() - begin
     assert process.returncode in (0, 1), process.returncode
     plan = json.loads((place / "plan" / "plan.json").read_text())
@@ -150,7 +150,7 @@ def _run(mesh: Path, place: Path, words: Sequence[str], cache: Path | None) -> R
     return Run(stands, ends, spent, used.ru_maxrss / 1e6, plan)
 
 
-def _waited(process: subprocess.Popen[str]) -> resource.struct_rusage:
+def waited(process: subprocess.Popen[str]) -> resource.struct_rusage:
     """Wait for a process; return what it used."""
     _, status, used = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
