@@ -6,7 +6,6 @@ from itertools import product
 from typing import Literal
 
 import numpy as np
-from trimesh.registration import procrustes
 
 from geometry.arrays import Array
 from geometry.mesh.mesh import TriangleMesh
