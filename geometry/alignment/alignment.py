@@ -120,6 +120,9 @@ def _by_icp(first: TriangleMesh, points: Array, start: Array) -> Array:
     """
     # It takes long to import, and few runs need it.
 
+    # It takes long to import, and few runs need it.
+    from trimesh.registration import procrustes
+
     pose, error = start, np.inf
     for _ in range(_STEPS):
         near = closest_points(first, _moved(points, pose))
