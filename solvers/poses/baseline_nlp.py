@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from . import baseline_formulas as formulas
 from .baseline_problem import BaselineProblem
 from .baseline_rows import Formula, Rows, StackedRows, kind_of
 
@@ -15,7 +16,6 @@ _Array = NDArray[np.float64]
 
 _MEAN_WEIGHT = 0.05
 _THIN = 1e-6
-_SMOOTH = 1e-12
 # Of poses that violate limits as little, the nearest; and what slacks start from.
 _NEAR = 1e-3
 _SLACK = 0.1
@@ -52,43 +52,42 @@ def build_baseline_program(problem: BaselineProblem) -> BaselineProgram:
     if len(problem.seams.points):
         blocks.append(_seams(names))
     kept = list(_kept(names)) if len(problem.kept.camera) else []
-    start = names.start
     first = sum(block.n_rows for block in blocks)
     rows = StackedRows((*blocks, *kept), *_lifted(names, kept, first))
-    blocks += kept
-    bounds = [block.bounds(start) for block in blocks]
-    x = ca.MX.sym("x", names.n)
-    weights = ca.MX.sym("lambda", rows.constant.size)
-    scale, none = ca.MX.sym("sigma"), ca.MX.sym("p", 0)
-    constraints = rows.values(x)
-    objective, own, of_own = _objective(names, x)
-    jacobian = rows.jacobian(x)
-    # The mean of the baselines is of the same rows as the least.
-    lambdas = weights
-    if not problem.elastic:
-        n = len(problem.pairs)
-        lambdas = ca.vertcat(weights[:n] - scale * _MEAN_WEIGHT / n, weights[n:])
-    hessian = rows.hessian(x, lambdas, scale * ca.DM(own), of_own)
-    derivatives = {
-        "jac_g": ca.Function(
-            "jac_g", [x, none], [constraints, jacobian], ["x", "p"], ["g", "jac_g_x"]
-        ),
-        "hess_lag": ca.Function(
-            "hess_lag",
-            [x, none, scale, weights],
-            [hessian],
-            ["x", "p", "lam_f", "lam_g"],
-            ["triu_hess_gamma_x_x"],
-        ),
-    }
+    start, x = names.start, ca.MX.sym("x", names.n)
+    bounds = [block.bounds(start) for block in rows.blocks]
     return BaselineProgram(
         x,
-        objective,
-        constraints,
-        derivatives,
+        _objective(names, x),
+        rows.values(x),
+        {"jac_g": _jacobian(rows, x), "hess_lag": _hessian(names, rows, x)},
         np.concatenate([low for low, _ in bounds]),
         np.concatenate([high for _, high in bounds]),
         start,
+    )
+
+
+def _jacobian(rows: StackedRows, x: ca.MX) -> ca.Function:
+    none, both = ca.MX.sym("p", 0), [rows.values(x), rows.jacobian(x)]
+    return ca.Function("jac_g", [x, none], both, ["x", "p"], ["g", "jac_g_x"])
+
+
+def _hessian(names: "_Variables", rows: StackedRows, x: ca.MX) -> ca.Function:
+    """Return the Hessian of sigma f + lambda.g, its upper triangle."""
+    weights, scale = ca.MX.sym("lambda", rows.constant.size), ca.MX.sym("sigma")
+    lambdas, near, moving = weights, np.zeros(0), np.zeros(0, dtype=np.int64)
+    if names.problem.elastic:
+        near, moving = names.near
+    else:
+        # The mean of the baselines is of the same rows as the least.
+        n = len(names.problem.pairs)
+        lambdas = ca.vertcat(weights[:n] - scale * _MEAN_WEIGHT / n, weights[n:])
+    return ca.Function(
+        "hess_lag",
+        [x, ca.MX.sym("p", 0), scale, weights],
+        [rows.hessian(x, lambdas, 2.0 * scale * ca.DM(near), moving)],
+        ["x", "p", "lam_f", "lam_g"],
+        ["triu_hess_gamma_x_x"],
     )
 
 
@@ -136,6 +135,18 @@ class _Variables:
         return np.concatenate([centres, aims + centres, rolls], axis=1)
 
     @property
+    def near(self) -> tuple[_Array, NDArray[np.int64]]:
+        """What a square of a pose's variables costs, and which these are.
+
+        Centres and aims count by the step, rolls in [rad].
+        """
+        n_moved = 3 * self.k
+        moving = np.append(np.arange(n_moved), n_moved + 1 + np.arange(4 * self.k))
+        near = np.full(moving.size, _NEAR / self.problem.max_step**2)
+        near[2 * n_moved :] = _NEAR
+        return near, moving
+
+    @property
     def start(self) -> _Array:
         problem = self.problem
         begin = problem.centres.ravel()
@@ -146,28 +157,17 @@ class _Variables:
         return np.concatenate([begin, [0.0], looks, slacks, np.zeros(self.n_ends)])
 
 
-def _objective(names: _Variables, x: ca.MX) -> tuple[ca.MX, _Array, NDArray[np.int64]]:
-    """Return f; and of its Hessian what isn't of the pairs, a diagonal, and where."""
-    problem, start = names.problem, names.start
+def _objective(names: _Variables, x: ca.MX) -> ca.MX:
+    problem = names.problem
     if problem.weights is None:
         one, two = (names.centres(problem.pairs[:, i]) for i in range(2))
-        apart = ca.reshape(
-            x[one.ravel().tolist()] - x[two.ravel().tolist()], 3, len(one)
-        )
-        baselines = ca.sqrt(ca.sum1(apart**2))
-        mean = ca.sum2(baselines) / len(problem.pairs)
-        nothing = np.zeros(0)
-        return -x[names.t] - _MEAN_WEIGHT * mean, nothing, nothing.astype(np.int64)
-    n_moved = 3 * names.k
-    moving = np.append(np.arange(n_moved), n_moved + 1 + np.arange(4 * names.k))
-    # Centres and aims by the step, rolls in [rad].
-    near = np.full(moving.size, _NEAR / problem.max_step**2)
-    near[2 * n_moved :] = _NEAR
-    moved = x[moving.tolist()] - ca.DM(start[moving])
+        apart = x[one.ravel().tolist()] - x[two.ravel().tolist()]
+        baselines = ca.sqrt(ca.sum1(ca.reshape(apart, 3, len(one)) ** 2))
+        return -x[names.t] - _MEAN_WEIGHT * ca.sum2(baselines) / len(one)
+    near, moving = names.near
+    moved = x[moving.tolist()] - ca.DM(names.start[moving])
     slacks = x[names.slacks : names.slacks + len(problem.weights)]
-    objective = ca.dot(ca.DM(problem.weights), slacks)
-    objective += ca.dot(ca.DM(near), moved**2)
-    return objective, 2.0 * near, moving
+    return ca.dot(ca.DM(problem.weights), slacks) + ca.dot(ca.DM(near), moved**2)
 
 
 def _lifted(
@@ -220,11 +220,7 @@ def _apart(names: _Variables) -> Iterator[Rows]:
         return
     one, two = (names.centres(problem.pairs[:, i]) for i in range(2))
     t = np.full((len(one), 1), names.t)
-    yield _rows(_apart_formula, np.concatenate([one, two, t], axis=1))
-
-
-def _apart_formula(v: ca.SX, q: ca.SX) -> ca.SX:
-    return ca.norm_2(v[:3] - v[3:6]) - v[6]
+    yield _rows(formulas.apart, np.concatenate([one, two, t], axis=1))
 
 
 def _workspace(names: _Variables) -> Iterator[Rows]:
@@ -237,40 +233,23 @@ def _workspace(names: _Variables) -> Iterator[Rows]:
     thin = high - low < _THIN * high
     radius = (0.5 * (low + high),) * 2 if thin else (low, high)
     if len(free):
-        yield _rows(_distance_formula, free, shell.centre, *radius)
+        yield _rows(formulas.distance, free, shell.centre, *radius)
         if shell.half_angle < np.pi:
             cone = *shell.centre, *shell.axis, np.cos(shell.half_angle)
-            yield _rows(_cone_formula, free, np.array(cone))
+            yield _rows(formulas.in_cone, free, np.array(cone))
         if shell.floor is not None:
             yield _rows(
-                _along_formula, free, np.append(shell.centre, shell.up), shell.floor
+                formulas.height, free, np.append(shell.centre, shell.up), shell.floor
             )
     held = problem.half_spaces
     if len(held.camera):
         centre = np.tile(shell.centre, (len(held.camera), 1))
         data = np.concatenate([centre, held.normals], axis=1)
         places = names.centres(held.camera)
-        yield _rows(_along_formula, places, data, held.offsets[:, None])
+        yield _rows(formulas.height, places, data, held.offsets[:, None])
     # Squared, since the distance from the start has no derivative at the start.
     places, most = names.centres(every), problem.max_step**2
-    yield _rows(_square_formula, places, problem.centres, 0.0, most)
-
-
-def _distance_formula(v: ca.SX, q: ca.SX) -> ca.SX:
-    return ca.norm_2(v - q)
-
-
-def _cone_formula(v: ca.SX, q: ca.SX) -> ca.SX:
-    offset = v - q[:3]
-    return ca.dot(offset, q[3:6]) - q[6] * ca.norm_2(offset)
-
-
-def _along_formula(v: ca.SX, q: ca.SX) -> ca.SX:
-    return ca.dot(v - q[:3], q[3:6])
-
-
-def _square_formula(v: ca.SX, q: ca.SX) -> ca.SX:
-    return ca.sumsqr(v - q)
+    yield _rows(formulas.square, places, problem.centres, 0.0, most)
 
 
 def _seams(names: _Variables) -> Rows:
@@ -286,32 +265,9 @@ def _seams(names: _Variables) -> Rows:
         axis=1,
     )
     places = np.concatenate([names.centres(one), names.centres(two)], axis=1)
-    now = _rows(_left_formula, places, data).at(names.start)
+    now = _rows(formulas.margins, places, data).at(names.start)
     data = np.concatenate([data, now[:, :2].min(axis=1, keepdims=True)], axis=1)
-    return _rows(_seam_formula, places, data, admitted=True)
-
-
-def _left_formula(v: ca.SX, q: ca.SX) -> ca.SX:
-    """Return theta - iota_i and b_i - beta_i of both cameras at a seam point, (4,)."""
-    point, outward, onward, turn = q[:3], q[3:6], q[6:9], q[9]
-    half1, half2, aim1, aim2, theta = q[10], q[11], q[12:15], q[15:18], q[18]
-
-    def bearing(u: ca.SX) -> ca.SX:
-        return ca.atan2(ca.dot(u, onward), ca.dot(u, outward))
-
-    one, two = v[:3], v[3:6]
-    at1, at2 = bearing(one - point), bearing(two - point)
-    back1, back2 = bearing(-_unit(aim1 - one)), bearing(-_unit(aim2 - two))
-    return ca.vertcat(
-        theta + at1, half1 - back1 + at1, theta - at2 + turn, half2 - at2 + back2
-    )
-
-
-def _seam_formula(v: ca.SX, q: ca.SX) -> ca.SX:
-    left, reserve = _left_formula(v, q[:19]), q[19]
-    return ca.vertcat(
-        *(left[i] - reserve + left[j] for i in range(2) for j in range(2, 4))
-    )
+    return _rows(formulas.shared_margins, places, data, admitted=True)
 
 
 def _kept(names: _Variables) -> Iterator[Rows]:
@@ -332,10 +288,10 @@ def _kept(names: _Variables) -> Iterator[Rows]:
         axis=1,
     )
     if problem.elastic:
-        yield _rows(_view_formula, names.poses(camera), data)
+        yield _rows(formulas.view, names.poses(camera), data)
     else:
         data = np.concatenate([data, looks[camera]], axis=1)
-        yield _rows(_held_view_formula, names.centres(camera), data, admitted=admitted)
+        yield _rows(formulas.held_view, names.centres(camera), data, admitted=admitted)
     _, ringed = _kept_points(names)
     if len(ringed):
         m, normal = kept.ring_normals[ringed], kept.normals[ringed]
@@ -349,55 +305,7 @@ def _kept(names: _Variables) -> Iterator[Rows]:
             ]
         )
         places = names.centres(camera[ringed])
-        yield _rows(_ring_formula, places, data, admitted=admitted)
-
-
-def _held_view_formula(v: ca.SX, q: ca.SX) -> ca.SX:
-    """The same of a camera whose aim and roll stay."""
-    return _view_formula(ca.vertcat(v, q[16:20]), q[:16])
-
-
-def _view_formula(v: ca.SX, q: ca.SX) -> ca.SX:
-    """What incidence, range and the four sides of the image leave."""
-    centre, aim, roll = v[:3], v[3:6], v[6]
-    point, normal, up = q[:3], q[3:6], q[6:9]
-    low, high, cosine, near, far = q[9:11], q[11:13], q[13], q[14], q[15]
-    ray = point - centre
-    distance = ca.norm_2(ray)
-    margins = [
-        -ca.dot(ray, normal) / distance - cosine,
-        distance / near - 1.0,
-        1.0 - distance / far,
-    ]
-    z = _unit(aim - centre)
-    level = _unit(ca.cross(z, up))
-    down = ca.cross(z, level)
-    c, s = ca.cos(roll), ca.sin(roll)
-    depth = ca.dot(ray, z) / distance
-    across = c * level + s * down, c * down - s * level
-    for least, most, side in zip(
-        ca.vertsplit(low), ca.vertsplit(high), across, strict=True
-    ):
-        aside = ca.dot(ray, side) / distance
-        margins.append((aside - least * depth) / ca.sqrt(1.0 + least**2))
-        margins.append((most * depth - aside) / ca.sqrt(1.0 + most**2))
-    return ca.vertcat(*margins)
-
-
-def _ring_formula(v: ca.SX, q: ca.SX) -> ca.SX:
-    """What |r.m|, s_N and ring pitch leave."""
-    point, m, normal, slant, least = q[:3], q[3:6], q[6:9], q[9], q[10]
-    ray = point - v
-    distance = ca.norm_2(ray)
-    along, facing = ca.dot(ray, m) / distance, -ca.dot(ray, normal) / distance
-    square = along**2 + facing**2 + 2.0 * along * facing * slant
-    # v is null only where ring and surface are parallel; keep the root smooth there.
-    spread = distance * ca.sqrt(square + _SMOOTH)
-    return ca.vertcat(along - least, along - spread * q[11], facing - spread * q[12])
-
-
-def _unit(a: ca.SX) -> ca.SX:
-    return a / ca.norm_2(a)
+        yield _rows(formulas.ring, places, data, admitted=admitted)
 
 
 def _rows(
