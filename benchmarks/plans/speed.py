@@ -1,18 +1,20 @@
 """Time the main job from mesh to files, and again with another requirement.
 
-Usage: python -m benchmarks.plans.speed [--runs N] [NAME ...]   (ringrig installed, a
-    checkout)
+Usage: python -m benchmarks.plans.speed [--runs N] [--others K] [NAME ...]   (ringrig
+    installed, a checkout)
 
 Plans the sample, a sample head of 100,000 faces and, where `../shared/data/meshes`
 exists, the face scan and the scan of 1.16 million faces (those named, if any) with the
 default rig and at most three projectors. The first run has an empty cache; the second
 asks for another coverage, accuracy or number of cameras and has the cache that the
-first left. Prints the median over N runs (5) of wall time, processor time over all
-threads and peak memory; of the second what part of the first's wall time it took, until
-the plan stands and until it is checked and all is written; and whether its plan is that
-of a run without a cache, but for what a run says of itself. Returns 1 if one isn't.
+first left (the first K of these three, all by default). Prints the median over N runs
+(5) of wall time, processor time over all threads and peak memory; of the second what
+part of the first's wall time it took, until the plan stands and until it is checked and
+all is written; and whether its plan is that of a run without a cache, but for what a
+run says of itself. Returns 1 if one isn't.
 """
 
+import argparse
 import json
 import os
 import platform
@@ -55,12 +57,12 @@ class Run:
 
 def main() -> int:
     """Print the table."""
-    words = sys.argv[1:]
-    runs = _RUNS
-    if "--runs" in words:
-        at = words.index("--runs")
-        runs = int(words[at + 1])
-        del words[at : at + 2]
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--runs", type=int, default=_RUNS)
+    parser.add_argument("--others", type=int, default=len(_OTHERS))
+    parser.add_argument("names", nargs="*", default=_NAMES)
+    asked = parser.parse_args()
+    runs, others = asked.runs, _OTHERS[: asked.others]
     print(
         f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
         f"cores; medians of {runs} runs\n"
@@ -70,15 +72,17 @@ def main() -> int:
         "| same plan |\n" + 8 * "|---" + "|"
     )
     differ = False
-    for name in words or _NAMES:
+    for name in asked.names:
         with tempfile.TemporaryDirectory() as folder:
             place = Path(folder)
             if (mesh := _mesh(name, place)) is not None:
-                differ |= _told_of(name, mesh, place, runs)
+                differ |= _told_of(name, mesh, place, runs, others)
     return int(differ)
 
 
-def _told_of(name: str, mesh: Path, place: Path, runs: int) -> bool:
+def _told_of(
+    name: str, mesh: Path, place: Path, runs: int, others: Sequence[Sequence[str]]
+) -> bool:
     """Print the rows of a mesh; return whether a cache changed a plan."""
     left, cache = place / "left", place / "cache"
     firsts: list[Run] = []
@@ -87,7 +91,7 @@ def _told_of(name: str, mesh: Path, place: Path, runs: int) -> bool:
         firsts.append(_run(mesh, place, (), left))
     _row(name, "", firsts, (), "")
     differ = False
-    for words in _OTHERS:
+    for words in others:
         seconds: list[Run] = []
         for _ in range(runs):
             shutil.copytree(left, cache)
