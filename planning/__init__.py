@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from planning.scene.interest import read_weight as read_weight
     from planning.scene.ranges.ranged_body import RangedBody as RangedBody
     from planning.scene.ranges.ranged_body import read_ranges as read_ranges
-    from planning.verify.verification import Verification as Verification
+    from planning.verify.verdict import Verification as Verification
     from planning.verify.verification import verify_plan as verify_plan
 
     RigPlan = HandedPlan

@@ -13,7 +13,7 @@ from planning.report.drawing.rig_picture import draw_rig
 from planning.report.page.page import PAGE, error_by_face, is_page, write_page
 from planning.verify.reconstruction.pattern_files import write_patterns
 from planning.verify.reconstruction.scanner import Scanner
-from planning.verify.verification import Verification
+from planning.verify.verdict import Verification
 
 from .output_folder import OWNED, exchanged, uninterrupted
 

@@ -19,7 +19,8 @@ from planning.verify.reconstruction.check.result import Reconstruction
 from planning.verify.reconstruction.pattern_files import write_patterns
 from planning.verify.reconstruction.reconstruct import reconstruct
 from planning.verify.reconstruction.scanner import Scanner
-from planning.verify.verification import Verification, verify_plan
+from planning.verify.verdict import Verification
+from planning.verify.verification import verify_plan
 
 from .plan_tables import Table, coverage_rows, device_rows, region_rows, table
 from .plots import PLOTS, Axes, new_axes

@@ -22,8 +22,8 @@ from .surface import Surface
 
 # Keys that tell how a plan came about and how its check ended.
 _NOT_PLANNED = {
-    *("created", "command", "truncated", "members", "reconstruction"),
-    *("cost", "timings_s"),
+    *("created", "made_with", "command", "truncated", "members"),
+    *("reconstruction", "cost", "timings_s"),
 }
 # So many faults of a file are told; a file of another kind has hundreds.
 _MOST_FAULTS = 20

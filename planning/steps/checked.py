@@ -7,7 +7,8 @@ from planning.model.progress import TIME_IS_UP, Stopwatch
 from planning.report.entries.cost_entry import cost_record
 from planning.report.partial_plan import PartialPlan
 from planning.report.summary.shortfall import shortfalls
-from planning.verify.verification import Verification, verify_plan
+from planning.verify.verdict import Verification
+from planning.verify.verification import verify_plan
 
 from .best_kept import Keep
 

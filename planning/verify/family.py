@@ -16,7 +16,7 @@ _OWN = frozenset(
     ("created", "timings_s", "cost", "meshes", "surface", "members", "family")
 )
 # What all members must have in common; the rest is what a mesh makes of it.
-_SHARED = ("seed", "command", "truncated", "rig")
+_SHARED = ("seed", "made_with", "command", "truncated", "rig")
 _SLACK = 1e-9
 
 

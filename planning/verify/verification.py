@@ -1,7 +1,7 @@
 """`plan verify`: the audit of every claim, then the simulated reconstruction."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,14 +9,18 @@ import numpy as np
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.parallel import abandonable, n_threads
+from planning.model.document.made_with import MadeWith
 from planning.model.errors import InputError
 from planning.model.plan import RigPlan
-from planning.model.words import count_words
-from planning.verify.audit.audit import Audit, audited
+from planning.verify.audit.audit import audited
 from planning.verify.audit.audit_case import AuditCase, examine
 from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.coverage.prediction import possible_at_floors
-from planning.verify.audit.figure_claims import compare_figures, contradictions
+from planning.verify.audit.figure_claims import (
+    compare_exactly,
+    compare_figures,
+    contradictions,
+)
 from planning.verify.family import audit_family
 from planning.verify.mesh_comparison import comparable, compare_meshes
 from planning.verify.reconstruction.check.accuracy import Expected
@@ -33,84 +37,7 @@ from planning.verify.reconstruction.render.mitsuba.physics import Physics
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.scanner import Scanner
 
-_MM = 1e3
-
-
-@dataclass(frozen=True, eq=False)
-class Verification:
-    """Whether a plan's claims hold.
-
-    Attributes:
-        failures: One sentence for each false claim, and for each limit of the check
-            that isn't kept and that the plan doesn't report.
-        audit: The geometric audit.
-        reconstruction: The simulated one; None if it wasn't asked for.
-        missed: Limits of the check that aren't kept, as the plan records itself.
-        members: Of a family each member's name, and what was found of it; the audit and
-            the reconstruction are then the worst member's.
-    """
-
-    failures: tuple[str, ...]
-    audit: Audit
-    reconstruction: Reconstruction | None
-    missed: tuple[str, ...] = ()
-    members: tuple[tuple[str, "Verification"], ...] = ()
-
-    @property
-    def passed(self) -> bool:
-        """Whether every claim holds; a plan may claim that it misses something."""
-        return not self.failures
-
-    @property
-    def unmet(self) -> tuple[str, ...]:
-        """Requirements and limits that the plan misses and reports: nothing false."""
-        return self.audit.unmet + self.missed
-
-    @property
-    def coverage(self) -> dict[str, dict[str, float]]:
-        """Recomputed areas of `surface` and `target`, keys as in the plan [m²]."""
-        return self.audit.areas
-
-    def to_document(self) -> dict[str, Any]:
-        """Return plain JSON values."""
-        pixels = self.reconstruction
-        named = {name: member.to_document() for name, member in self.members}
-        return {
-            "passed": self.passed,
-            "failures": list(self.failures),
-            "unmet": list(self.unmet),
-            "coverage": self.coverage,
-            "samples": len(self.audit.case.samples),
-            "reconstruction": None if pixels is None else pixels.to_document(),
-            **({"members": named} if named else {}),
-        }
-
-    def summary(self) -> str:
-        """Return the verdict for a person, in a few lines."""
-        alone = self.audit.case.plan.cameras_alone
-        lines = [
-            f"{name}: {'verified' if member.passed else 'NOT verified'}"
-            for name, member in self.members
-        ]
-        if lines:
-            lines.append("the worst member:")
-        lines += [
-            _areas_line(name, self.coverage[name], alone=alone)
-            for name in ("target", "surface")
-        ]
-        lines.append(_pixels_line(self.reconstruction))
-        bounced = self.reconstruction and self.reconstruction.record().interreflection
-        if bounced and bounced.warning():
-            lines.append(f"warning: {bounced.warning()}")
-        lines += [f"not met: {sentence}" for sentence in self.unmet]
-        lines += [f"FALSE: {sentence}" for sentence in self.failures]
-        checked = "pixels checked" if self.reconstruction is not None else "NOT CHECKED"
-        lines.append(
-            f"verified: every claim holds ({checked})"
-            if self.passed
-            else f"NOT verified: {count_words(len(self.failures), 'failure')}"
-        )
-        return "\n".join(lines)
+from .verdict import Verification
 
 
 def verify_plan(
@@ -200,10 +127,27 @@ def verify_plan(
     if truth is not None or other is not None or any(how.values()):
         # What is recorded is of the rig as planned, by the built-in renderer.
         return Verification((*failures, *pixels.failures), audit, pixels)
-    false = compare_figures(recorded, pixels.record())
+    false, compared = compare_figures(recorded, pixels.record()), ""
+    if recorded is not None:
+        apart = _made_apart(plan, seed)
+        compared = f"within tolerances: {apart}" if apart else "to the last digit"
+        false += [] if apart else compare_exactly(recorded, pixels.record())
     if recorded is not None and not recorded.passed and not false:
-        return Verification(tuple(failures), audit, pixels, pixels.failures)
-    return Verification((*failures, *pixels.failures, *false), audit, pixels)
+        failures, missed = tuple(failures), pixels.failures
+    else:
+        failures, missed = (*failures, *pixels.failures, *false), ()
+    return Verification(failures, audit, pixels, missed, compared=compared)
+
+
+def _made_apart(plan: RigPlan, seed: int) -> str:
+    """Why the check needn't give the same figures again; "": nothing is different."""
+    if seed != plan.document.seed:
+        return f"made with seed {plan.document.seed}, here {seed}"
+    made = plan.document.made_with
+    if made is None:
+        return "the plan doesn't say what it was made with"
+    differs = made.differs(MadeWith.here())
+    return f"made with {differs}" if differs else ""
 
 
 def _verify_family(
@@ -300,33 +244,3 @@ def bare(samples: AuditSamples) -> SurfaceSamples:
     """Return samples as the reconstruction takes them, of one weight."""
     weight = float(samples.weights[0]) if len(samples) else 0.0
     return SurfaceSamples(samples.points, samples.normals, samples.faces, weight)
-
-
-def _areas_line(name: str, areas: Mapping[str, float], *, alone: bool) -> str:
-    cm2 = {key: f"{1e4 * area:.2f}" for key, area in areas.items()}
-    if alone:
-        return (
-            f"{name} {cm2['area_m2']} cm², recomputed: "
-            f"{cm2['reachable_by_cameras_m2']} reachable by cameras, "
-            f"{cm2['measured_m2']} measured"
-        )
-    return (
-        f"{name} {cm2['area_m2']} cm², recomputed: "
-        f"{cm2['reachable_by_projectors_m2']} reachable by projectors, "
-        f"{cm2['lit_m2']} lit, "
-        f"{cm2['reachable_by_cameras_m2']} of it reachable by cameras, "
-        f"{cm2['measured_m2']} measured"
-    )
-
-
-def _pixels_line(pixels: Reconstruction | None) -> str:
-    if pixels is None:
-        return "pixels: NOT CHECKED"
-    if pixels.accuracy is None:
-        return "pixels: no point was measured"
-    errors, missing = pixels.accuracy, pixels.completeness.predicted_missing
-    return (
-        f"pixels: {pixels.n_merged} points, rms {_MM * errors.rms_m:.3f} mm, p95 "
-        f"{_MM * errors.p95_m:.3f} mm, bias {_MM * errors.bias_m:.3f} mm, "
-        f"predicted but missing {100 * (missing or 0.0):.2f} %"
-    )

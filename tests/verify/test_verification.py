@@ -9,6 +9,7 @@ import pytest
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import sphere
 from planning.model.document.check_records import ReconstructionRecord
+from planning.model.document.made_with import MadeWith
 from planning.model.errors import PlanFileError
 from planning.model.plan import RigPlan
 from planning.verify import verification
@@ -85,6 +86,52 @@ def test_recorded_figures_are_held_against_a_run_with_other_noise(handmade, veri
         handmade.build_plan(), lambda document: document.update(reconstruction=figures)
     )
     assert verify_plan(plan, seed=7).failures == ()
+
+
+def _made_here(handmade, figures, **elsewhere):
+    """A plan with recorded figures, made with what runs now but for some of it."""
+    made = MadeWith.here().to_document()
+    libraries = made["libraries"] | elsewhere
+
+    def change(document):
+        document["reconstruction"] = figures
+        document["made_with"] = made | {"libraries": libraries}
+
+    return handmade.tampered(handmade.build_plan(), change)
+
+
+def test_made_with_the_same_every_figure_is_compared_to_the_last_digit(
+    handmade, verified
+):
+    figures = verified[0].reconstruction.to_document()
+    honest = verify_plan(_made_here(handmade, figures))
+    assert honest.failures == ()
+    assert "recorded figures of the check compared to the last digit" in (
+        honest.summary()
+    )
+    moved = figures | {"accuracy_rms_m": figures["accuracy_rms_m"] * (1.0 + 1e-12)}
+    found = verify_plan(_made_here(handmade, moved))
+    assert len(found.failures) == 1
+    assert found.failures[0].startswith("reconstruction.accuracy_rms_m: claimed ")
+    apart = verify_plan(_made_here(handmade, moved, numpy="1.0"))
+    assert apart.failures == ()
+    assert f"within tolerances: made with numpy 1.0, here {np.__version__}" in (
+        apart.summary()
+    )
+
+
+def test_many_other_figures_are_counted_and_none_may_be_left_out(verified):
+    figures = verified[0].reconstruction.to_document()
+    read = ReconstructionRecord.model_validate
+    gone = "whole_surface", "dominant"
+    without = {key: value for key, value in figures.items() if key not in gone}
+    found = figure_claims.compare_exactly(read(without), read(figures))
+    assert len(found) == 9
+    assert re.fullmatch(r"reconstruction: \d+ more figures differ", found[-1])
+    assert figure_claims.compare_exactly(read(figures), read(figures)) == []
+    # Whether it passed is another claim.
+    verdict = {"passed": False, "failures": ["one"]}
+    assert figure_claims.compare_exactly(read(figures | verdict), read(figures)) == []
 
 
 def _strict(handmade, reconstruction):

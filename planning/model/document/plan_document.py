@@ -29,6 +29,7 @@ from .input_records import (
     Units,
 )
 from .joint_records import JointRecord
+from .made_with import MadeWith
 from .part import Part
 from .ring_records import RingAxes
 from .station_records import StationsRecord
@@ -98,6 +99,7 @@ class PlanDocument(Part):
     units: Units
     seed: int
     created: str
+    made_with: MadeWith | None = None
     command: tuple[str, ...]
     truncated: bool
     meshes: Annotated[tuple[MeshRecord, ...], Field(min_length=1)]

@@ -17,6 +17,7 @@ from planning.model.document.device_records import (
     ProjectorRecord,
 )
 from planning.model.document.input_records import RigRecord, Units
+from planning.model.document.made_with import MadeWith
 from planning.model.document.plan_document import (
     FORMAT,
     VERSION,
@@ -66,6 +67,7 @@ def document_of(
         units=Units(length="m", angle="rad"),
         seed=request.seed,
         created=datetime.now(UTC).isoformat(timespec="seconds"),
+        made_with=MadeWith.here(),
         command=request.command,
         truncated=truncated,
         meshes=(entries.mesh_record(scene.mesh, scene.shell),),

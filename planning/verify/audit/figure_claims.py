@@ -1,5 +1,9 @@
 """Figures of the check that a plan records, against those of a run again."""
 
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import cast
+
 from planning.model.document.check_records import ConfusionRecord, ReconstructionRecord
 from planning.model.document.part import Part
 from planning.model.requirements import CheckLimits
@@ -18,6 +22,9 @@ _REPEATABLE = {
     "predicted_missing": (0.25, 0.01),
 }
 _FRACTION_SLACK = 0.025
+_VERDICT = re.compile("passed|failures([.].*)?")
+# So many figures that differ are told.
+_MOST_TOLD = 8
 # Errors of parts of the surface are those of few points, and not compared.
 _SHARES = {*ConfusionRecord.model_fields, "predicted", "measured"}
 
@@ -63,6 +70,50 @@ def compare_figures(
         "claimed true, the check run again fails",
     )
     return list(findings.failures)
+
+
+def compare_exactly(
+    recorded: ReconstructionRecord | None, fresh: ReconstructionRecord
+) -> list[str]:
+    """Return where a recorded reconstruction isn't to the last digit one run again.
+
+    For what made it and its seed are the same: then so is every figure. What it says of
+    passing is another claim (`compare_figures`).
+    """
+    if recorded is None:
+        return []
+    findings = AuditFindings("reconstruction")
+    documents = (record.to_document() for record in (recorded, fresh))
+    claimed, again = (
+        {key: value for key, value in _leaves(document) if not _VERDICT.fullmatch(key)}
+        for document in documents
+    )
+    differ = [
+        key
+        for key in dict.fromkeys((*claimed, *again))
+        if claimed.get(key) != again.get(key)
+    ]
+    for key in differ[:_MOST_TOLD]:
+        ours, theirs = (d.get(key, "nothing") for d in (claimed, again))
+        findings.fail(key, f"claimed {ours!r}, the same check again gives {theirs!r}")
+    if len(differ) > _MOST_TOLD:
+        findings.fail("", f"{len(differ) - _MOST_TOLD} more figures differ")
+    return list(findings.failures)
+
+
+def _leaves(value: object, key: str = "") -> Iterator[tuple[str, object]]:
+    """Yield all values of a document with their keys, empty lists and objects too."""
+    parts: Iterable[tuple[object, object]] = ()
+    if isinstance(value, Mapping):
+        parts = cast(Mapping[object, object], value).items()
+    elif isinstance(value, Sequence) and not isinstance(value, str):
+        parts = enumerate(cast(Sequence[object], value))
+    empty = True
+    for name, part in parts:
+        empty = False
+        yield from _leaves(part, f"{key}.{name}" if key else str(name))
+    if empty:
+        yield key, value
 
 
 def contradictions(
