@@ -22,7 +22,9 @@ def with_check(plan: RigPlan, verification: Verification, clock: Stopwatch) -> R
         false = verification.audit.failures
         record = check.record()
         record = record.changed(
-            failures=(*false, *record.failures), passed=record.passed and not false
+            failures=(*false, *record.failures),
+            passed=record.passed and not false,
+            plan=plan.digest,
         )
     greedy = plan.document.certificates.cameras.greedy_count
     (member,) = plan.document.members

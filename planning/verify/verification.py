@@ -108,7 +108,7 @@ def verify_plan(
         if differs and comparable(mesh, plan.surface.mesh):
             other = mesh
     recorded = plan.document.reconstruction
-    differs += contradictions(recorded, plan.requirements.check)
+    differs += contradictions(recorded, plan.requirements.check, plan.digest)
     if not check_pixels:
         audit = audited(case)
         return Verification((*audit.failures, *differs), audit, None)

@@ -120,6 +120,27 @@ def test_made_with_the_same_every_figure_is_compared_to_the_last_digit(
     )
 
 
+def test_what_is_asked_and_edited_after_the_check_is_told(handmade, verified):
+    figures = verified[0].reconstruction.to_document()
+    digest = handmade.build_plan().digest
+
+    def loosened(document):
+        document["reconstruction"] = figures | {"plan": digest}
+        document["requirements"]["check"]["max_rms_m"] *= 2.0
+
+    plan = handmade.tampered(handmade.build_plan(), loosened)
+    (failure,) = verify_plan(plan, check_pixels=False).failures
+    assert failure.startswith(
+        f"reconstruction.plan: the check was of a plan with digest {digest[:16]}, and "
+        f"this one has {plan.digest[:16]}"
+    )
+    honest = handmade.tampered(
+        handmade.build_plan(),
+        lambda document: document.update(reconstruction=figures | {"plan": digest}),
+    )
+    assert verify_plan(honest, check_pixels=False).failures == ()
+
+
 def test_many_other_figures_are_counted_and_none_may_be_left_out(verified):
     figures = verified[0].reconstruction.to_document()
     read = ReconstructionRecord.model_validate

@@ -99,6 +99,7 @@ class ReconstructionRecord(Part):
         left_out_fraction: Share of the ring edges found in images that gave no point,
             or a point that merging took for a step between surfaces.
         beyond_1mm_fraction: Share of the merged points that are off by more.
+        plan: Digest of the plan that was checked (`RigPlan.digest`).
     """
 
     n_points: int
@@ -121,3 +122,4 @@ class ReconstructionRecord(Part):
     interreflection: InterreflectionRecord | None = None
     passed: bool
     failures: tuple[str, ...]
+    plan: str | None = None

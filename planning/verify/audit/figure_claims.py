@@ -22,7 +22,8 @@ _REPEATABLE = {
     "predicted_missing": (0.25, 0.01),
 }
 _FRACTION_SLACK = 0.025
-_VERDICT = re.compile("passed|failures([.].*)?")
+# What isn't a figure of the check: how it ended, and of which plan it was.
+_VERDICT = re.compile("passed|failures([.].*)?|plan")
 # So many figures that differ are told.
 _MOST_TOLD = 8
 # Errors of parts of the surface are those of few points, and not compared.
@@ -117,11 +118,12 @@ def _leaves(value: object, key: str = "") -> Iterator[tuple[str, object]]:
 
 
 def contradictions(
-    recorded: ReconstructionRecord | None, limits: CheckLimits
+    recorded: ReconstructionRecord | None, limits: CheckLimits, digest: str
 ) -> list[str]:
-    """Return where a recorded check contradicts itself, or the light it was to assume.
+    """Return where a recorded check contradicts itself, or the plan that it stands in.
 
-    Passed, but with failures; in other room light than is required.
+    Passed, but with failures; in other room light than is required; of a plan with
+    another digest: a claim, pose, limit or requirement was edited after the check.
     """
     findings = AuditFindings("reconstruction")
     if recorded is None:
@@ -131,6 +133,12 @@ def contradictions(
         "passed",
         f"claimed {recorded.passed!r}, but reconstruction.failures is "
         f"{list(recorded.failures)!r}",
+    )
+    findings.holds(
+        recorded.plan in (None, digest),
+        "plan",
+        f"the check was of a plan with digest {(recorded.plan or '')[:16]}, and this "
+        f"one has {digest[:16]}: what was planned or asked was edited after the check",
     )
     if recorded.ambient is not None:
         whose = "requirements.check.ambient"
