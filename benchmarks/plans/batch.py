@@ -96,7 +96,11 @@ def _row(
     out, begin = place / folder, time.monotonic()
     command = ["batch", str(place / "parts"), "-o", str(out), *_ASKED, *words]
     command += ["--rig", str(place / "few.toml"), "--quiet"]
-    batch = subprocess.Popen([sys.executable, "-c", _PLAN, *command], text=True)
+    batch = subprocess.Popen(
+        [sys.executable, "-c", _PLAN, *command],
+        stdout=subprocess.DEVNULL,
+        text=True,
+    )
     disturb(out, batch)
     code = batch.wait()
     seconds = time.monotonic() - begin

@@ -15,6 +15,7 @@ from support.plain_shapes import box
 from geometry.shapes.sample_head.sample_head import sample_head
 from planning import RigPlan, load_rig, pipeline, plan_rig, verify_plan
 from planning.cli.other_commands import write_sample
+from planning.model.document.made_with import MadeWith
 from planning.model.errors import InfeasibleLimitsError, InputError, TimeLimitError
 from planning.model.plan import InterruptedPlanError, RequirementError
 from planning.model.progress import Stopwatch
@@ -103,6 +104,9 @@ def test_every_requirement_is_met_and_the_check_passed(plan):
     assert check["accuracy_rms_m"] <= asked.check.max_rms_m
     assert check["predicted_missing"] <= asked.check.max_predicted_missing
     assert 1e-3 < asked.check.tau_m < 8e-3
+    # Whoever has the same may hold all figures to the last digit.
+    assert plan.document.made_with == MadeWith.here()
+    assert check["plan"] == plan.digest
 
 
 def test_free_axes_are_tried_where_centred_ones_alone_fall_short(plan, monkeypatch):
