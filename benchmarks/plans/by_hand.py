@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.optimize import Bounds, LinearConstraint, milp
 
+from geometry.poses import fibonacci_cap
 from planning.report.partial_plan import Prepared
 
 _Array = NDArray[np.float64]
@@ -58,7 +59,9 @@ class ByHand:
         normals, steep = mesh.face_normals[faces], scene.steep[faces]
         space = limits.workspace
         radius = float(np.mean(space.projector_radius_m))
-        places = np.array(space.centre) + radius * _spread(n)
+        places = np.array(space.centre) + radius * fibonacci_cap(
+            n, np.array([0.0, 0.0, 1.0]), np.pi
+        )
         towards = places[None] - points[:, None]
         distance = np.linalg.norm(towards, axis=2)
         towards /= distance[:, :, None]
@@ -114,11 +117,3 @@ def by_milp(covers: _Mask, share: float, limit_s: float) -> list[int] | None:
     if found.x is None:
         return None
     return np.flatnonzero(found.x[:m] > 0.5).tolist()
-
-
-def _spread(n: int) -> _Array:
-    """Fibonacci's directions, (n, 3)."""
-    z = 1.0 - (2.0 * np.arange(n) + 1.0) / n
-    turn = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(n)
-    flat = np.sqrt(1.0 - z * z)
-    return np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)

@@ -31,8 +31,7 @@ import numpy as np
 from planning import RigPlan
 from planning.cli.other_commands import write_sample
 from planning.model.errors import PlanningError
-from planning.verify.audit.figure_claims import compare_figures
-from planning.verify.verification import verify_plan
+from planning.verify.verification import hold_figures, verify_plan
 
 from .speed import RUN
 
@@ -162,7 +161,7 @@ def _judged(edited: dict[str, Any], plan: RigPlan, fresh: Any) -> str:  # noqa: 
         if other.document.surface.sha256 != plan.document.surface.sha256:
             return "refused"
         found = verify_plan(other, check_pixels=False).failures
-        found += tuple(compare_figures(other.document.reconstruction, fresh))
+        found += tuple(hold_figures(other, fresh, plan.document.seed)[0])
     except PlanningError:
         return "refused"
     except Exception as error:

@@ -11,13 +11,10 @@ and the exponents: slopes of log time against log size, over all sizes and from 
 the next at the end.
 """
 
-import json
 import os
 import platform
-import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,7 +23,7 @@ import numpy as np
 
 from planning.cli.other_commands import write_sample
 
-from .speed import ROOT, RUN, waited
+from .speed import ROOT, timed_run
 
 _FACES = 20_000, 60_000, 200_000, 600_000, 2_000_000
 _CANDIDATES = 250, 500, 1000, 2000, 4000, 8000
@@ -93,25 +90,10 @@ def _runs(kind: str, sizes: Sequence[int]) -> Iterator[Timed]:
 
 
 def _run(size: int, place: Path, mesh: Path, *words: str) -> Timed:
-    asked = ["--mesh", str(mesh), "--max-projectors", "3", "-o", str(place / "plan")]
-    begin, stands = time.monotonic(), 0.0
-    with subprocess.Popen(
-        [*RUN, *asked, *words, "--no-report", "--no-patterns"],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-    ) as process:
-        assert process.stderr is not None
-        for line in process.stderr:
-            if "NOT CHECKED yet" in line:
-                stands = time.monotonic() - begin
-        used = waited(process)
-    ends = time.monotonic() - begin
-    assert process.returncode in (0, 1), process.returncode
-    plan = json.loads((place / "plan" / "plan.json").read_text())
-    parts = plan["timings_s"] | {"to the plan": stands, "to the end": ends}
-    devices = f"{len(plan['projectors'])} + {len(plan['cameras'])}"
-    return Timed(size, parts, devices, used.ru_maxrss / 1e6)
+    run = timed_run(mesh, place, (*words, "--no-report", "--no-patterns"))
+    whole = {"to the plan": run.stands_s, "to the end": run.ends_s}
+    devices = f"{len(run.plan['projectors'])} + {len(run.plan['cameras'])}"
+    return Timed(size, run.plan["timings_s"] | whole, devices, run.peak_gb)
 
 
 def _exponents(runs: Sequence[Timed], part: str) -> str:

@@ -18,13 +18,12 @@ import argparse
 import json
 import os
 import platform
-import resource
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -132,33 +131,37 @@ def _mesh(name: str, place: Path) -> Path | None:
 
 
 def _run(mesh: Path, place: Path, words: Sequence[str], cache: Path | None) -> Run:
-    asked = ["--mesh", str(mesh), "--max-projectors", "3", "-o", str(place / "plan")]
     folder = {"RINGRIG_CACHE": "" if cache is None else str(cache)}
+    return timed_run(mesh, place, words, os.environ | folder)
+
+
+def timed_run(
+    mesh: Path,
+    place: Path,
+    words: Sequence[str],
+    environment: Mapping[str, str] | None = None,
+) -> Run:
+    """Plan a mesh with at most three projectors into a folder of `place`."""
+    asked = ["--mesh", str(mesh), "--max-projectors", "3", "-o", str(place / "plan")]
     begin, stands = time.monotonic(), 0.0
     with subprocess.Popen(
         [*RUN, *asked, *words],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
-        env=os.environ | folder,
+        env=environment,
     ) as process:
         assert process.stderr is not None
         for line in process.stderr:
             if "NOT CHECKED yet" in line:
                 stands = time.monotonic() - begin
-        used = waited(process)
+        _, status, used = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
     ends = time.monotonic() - begin
     assert process.returncode in (0, 1), process.returncode
     plan = json.loads((place / "plan" / "plan.json").read_text())
     spent = used.ru_utime + used.ru_stime
     return Run(stands, ends, spent, used.ru_maxrss / 1e6, plan)
-
-
-def waited(process: subprocess.Popen[str]) -> resource.struct_rusage:
-    """Wait for a process; return what it used."""
-    _, status, used = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    return used
 
 
 def _told(plan: dict[str, Any]) -> dict[str, Any]:

@@ -4,7 +4,6 @@ import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from platform import machine, python_version
 from typing import Any
@@ -14,14 +13,13 @@ import numpy as np
 from pydantic import BaseModel
 
 from geometry.mesh.mesh import TriangleMesh
+from planning.model.installed import sources_hash, versions
 from planning.model.planned import PlannedCamera, PlannedProjector
 
 _Update = Callable[[bytes | memoryview], None]
 
 # Rooms of `planning` that no remembered function reaches, by the layers of the house.
 _ABOVE = ("cli", "experiments", "handover", "report", "verify")
-# Another version of these may round otherwise.
-_LIBRARIES = ("numpy", "scipy", "libigl", "trimesh", "embreex", "casadi", "highspy")
 # Values that are asked for again and again, and never change.
 _VALUES = TriangleMesh, PlannedProjector, PlannedCamera
 _known: WeakKeyDictionary[object, str] = WeakKeyDictionary()
@@ -44,25 +42,7 @@ def content(*values: object) -> str:
 @cache
 def code_content() -> str:
     """Return a hash of the code and the libraries that answers come from."""
-    root = Path(__file__).parents[2]
-    sources = [
-        path
-        for package in ("geometry", "planning", "solvers")
-        for path in sorted((root / package).rglob("*.py"))
-        if path.relative_to(root).parts[1] not in _ABOVE
-    ]
-    hashed = hashlib.blake2b(digest_size=20)
-    for path in sources:
-        hashed.update(f"{path.relative_to(root)}\n".encode() + path.read_bytes())
-    libraries = [_version(name) for name in ("ringrig", *_LIBRARIES)]
-    return content(hashed.hexdigest(), libraries, python_version(), machine())
-
-
-def _version(name: str) -> str:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return ""
+    return content(sources_hash(_ABOVE), versions(), python_version(), machine())
 
 
 def _feed(update: _Update, value: Any) -> None:  # noqa: ANN401

@@ -11,14 +11,12 @@ from scipy import sparse
 from . import baseline_formulas as formulas
 from .baseline_problem import BaselineProblem
 from .baseline_rows import Formula, Rows, StackedRows, kind_of
+from .baseline_variables import Variables
 
 _Array = NDArray[np.float64]
 
 _MEAN_WEIGHT = 0.05
 _THIN = 1e-6
-# Of poses that violate limits as little, the nearest; and what slacks start from.
-_NEAR = 1e-3
-_SLACK = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +45,7 @@ class BaselineProgram:
 
 def build_baseline_program(problem: BaselineProblem) -> BaselineProgram:
     """State the program."""
-    names = _Variables(problem)
+    names = Variables(problem)
     blocks = [*_apart(names), *_workspace(names)]
     if len(problem.seams.points):
         blocks.append(_seams(names))
@@ -56,23 +54,21 @@ def build_baseline_program(problem: BaselineProblem) -> BaselineProgram:
     rows = StackedRows((*blocks, *kept), *_lifted(names, kept, first))
     start, x = names.start, ca.MX.sym("x", names.n)
     bounds = [block.bounds(start) for block in rows.blocks]
+    constraints, none = rows.values(x), ca.MX.sym("p", 0)
+    both = constraints, rows.jacobian(x)
+    jacobian = ca.Function("jac_g", [x, none], both, ["x", "p"], ["g", "jac_g_x"])
     return BaselineProgram(
         x,
         _objective(names, x),
-        rows.values(x),
-        {"jac_g": _jacobian(rows, x), "hess_lag": _hessian(names, rows, x)},
+        constraints,
+        {"jac_g": jacobian, "hess_lag": _hessian(names, rows, x)},
         np.concatenate([low for low, _ in bounds]),
         np.concatenate([high for _, high in bounds]),
         start,
     )
 
 
-def _jacobian(rows: StackedRows, x: ca.MX) -> ca.Function:
-    none, both = ca.MX.sym("p", 0), [rows.values(x), rows.jacobian(x)]
-    return ca.Function("jac_g", [x, none], both, ["x", "p"], ["g", "jac_g_x"])
-
-
-def _hessian(names: "_Variables", rows: StackedRows, x: ca.MX) -> ca.Function:
+def _hessian(names: Variables, rows: StackedRows, x: ca.MX) -> ca.Function:
     """Return the Hessian of sigma f + lambda.g, its upper triangle."""
     weights, scale = ca.MX.sym("lambda", rows.constant.size), ca.MX.sym("sigma")
     lambdas, near, moving = weights, np.zeros(0), np.zeros(0, dtype=np.int64)
@@ -91,73 +87,7 @@ def _hessian(names: "_Variables", rows: StackedRows, x: ca.MX) -> ca.Function:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Variables:
-    """Which variables of x are what."""
-
-    problem: BaselineProblem
-
-    @property
-    def k(self) -> int:
-        return len(self.problem.centres)
-
-    @property
-    def t(self) -> int:
-        return 3 * self.k
-
-    @property
-    def n(self) -> int:
-        return len(self.start)
-
-    @property
-    def n_ends(self) -> int:
-        return len(self.problem.reserves)
-
-    @property
-    def slacks(self) -> int:
-        """The first of what limits give way by."""
-        return 7 * self.k + 1
-
-    @property
-    def n_alone(self) -> int:
-        """How many kept points are at no end of a part."""
-        return len(self.problem.kept.camera) - 2 * self.n_ends
-
-    def centres(self, cameras: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Those of O_c, shape (m, 3)."""
-        return 3 * cameras[:, None] + np.arange(3)
-
-    def poses(self, cameras: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Those of O_c, the aim and the roll, shape (m, 7)."""
-        k, aims = self.k, 3 * self.k + 1
-        rolls = aims + 3 * k + cameras[:, None]
-        centres = self.centres(cameras)
-        return np.concatenate([centres, aims + centres, rolls], axis=1)
-
-    @property
-    def near(self) -> tuple[_Array, NDArray[np.int64]]:
-        """What a square of a pose's variables costs, and which these are.
-
-        Centres and aims count by the step, rolls in [rad].
-        """
-        n_moved = 3 * self.k
-        moving = np.append(np.arange(n_moved), n_moved + 1 + np.arange(4 * self.k))
-        near = np.full(moving.size, _NEAR / self.problem.max_step**2)
-        near[2 * n_moved :] = _NEAR
-        return near, moving
-
-    @property
-    def start(self) -> _Array:
-        problem = self.problem
-        begin = problem.centres.ravel()
-        if problem.weights is None:
-            return np.append(begin, problem.smallest_baseline)
-        slacks = np.full(len(problem.weights), _SLACK)
-        looks = np.append(problem.aims, problem.rolls)
-        return np.concatenate([begin, [0.0], looks, slacks, np.zeros(self.n_ends)])
-
-
-def _objective(names: _Variables, x: ca.MX) -> ca.MX:
+def _objective(names: Variables, x: ca.MX) -> ca.MX:
     problem = names.problem
     if problem.weights is None:
         one, two = (names.centres(problem.pairs[:, i]) for i in range(2))
@@ -171,7 +101,7 @@ def _objective(names: _Variables, x: ca.MX) -> ca.MX:
 
 
 def _lifted(
-    names: _Variables, kept: list[Rows], first: int
+    names: Variables, kept: list[Rows], first: int
 ) -> tuple[sparse.csc_array, _Array]:
     """What is added to the margins of kept points, whose rows begin at `first`.
 
@@ -206,14 +136,14 @@ def _lifted(
     return matrix, constant
 
 
-def _kept_points(names: _Variables) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _kept_points(names: Variables) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Kept points, and those of them at which rings bind."""
     kept = names.problem.kept
     ringed = np.flatnonzero(np.any(kept.ring_normals != 0.0, axis=1))
     return np.arange(len(kept.camera)), ringed
 
 
-def _apart(names: _Variables) -> Iterator[Rows]:
+def _apart(names: Variables) -> Iterator[Rows]:
     """Yield |O_a - O_b| >= t of pairs; of an elastic program there are none."""
     problem = names.problem
     if problem.elastic:
@@ -223,7 +153,7 @@ def _apart(names: _Variables) -> Iterator[Rows]:
     yield _rows(formulas.apart, np.concatenate([one, two, t], axis=1))
 
 
-def _workspace(names: _Variables) -> Iterator[Rows]:
+def _workspace(names: Variables) -> Iterator[Rows]:
     problem, shell = names.problem, names.problem.shell
     every = np.arange(names.k)
     # What stays may stand anywhere: the workspace holds the others.
@@ -252,7 +182,7 @@ def _workspace(names: _Variables) -> Iterator[Rows]:
     yield _rows(formulas.square, places, problem.centres, 0.0, most)
 
 
-def _seams(names: _Variables) -> Rows:
+def _seams(names: Variables) -> Rows:
     """Camera 2 has left at E what camera 1 gives up there, and vice versa."""
     problem, seams = names.problem, names.problem.seams
     one, two = seams.cameras.T
@@ -270,7 +200,7 @@ def _seams(names: _Variables) -> Rows:
     return _rows(formulas.shared_margins, places, data, admitted=True)
 
 
-def _kept(names: _Variables) -> Iterator[Rows]:
+def _kept(names: Variables) -> Iterator[Rows]:
     """Yield what incidence, range, the image and rings leave at kept points."""
     problem, kept = names.problem, names.problem.kept
     camera, admitted = kept.camera, not problem.elastic

@@ -61,9 +61,7 @@ def test_the_command_finds_what_an_earlier_run_left_and_plans_the_same(
     monkeypatch.setattr(small_job, "RIG", small_job.RIG + room)
 
     def planned(*words):
-        # Nothing of the check is kept.
-        asked = ["--target", "surface", "--dominant-coverage", "0.6", "--no-check"]
-        asked += words
+        asked = ["--target", "surface", "--dominant-coverage", "0.6", *words]
         ended = small_job.run(block, tmp_path, asked)
         assert ended.code == 0, ended.message
         return ended.plan, (tmp_path / "plan" / "surface.npz").read_bytes()

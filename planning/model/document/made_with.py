@@ -1,22 +1,14 @@
 """What a plan was made with: where it is the same, so is every figure."""
 
-import hashlib
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 from platform import machine, python_version
 from typing import Self
 
 import numpy as np
 
-from .part import Part
+from planning.model.installed import sources_hash, versions
 
-_PACKAGES = "geometry", "planning", "solvers"
-# Those whose numbers end up in the plan or its check.
-_LIBRARIES = (
-    *("numpy", "scipy", "embreex", "libigl", "casadi", "cvxpy", "highspy"),
-    *("trimesh", "Pillow"),
-)
+from .part import Part
 
 
 class MadeWith(Part):
@@ -53,22 +45,8 @@ class MadeWith(Part):
 
 
 @cache
-def _here() -> tuple[str, tuple[tuple[str, str], ...], str]:
-    root = Path(__file__).parents[3]
-    hashed = hashlib.sha256()
-    for package in _PACKAGES:
-        for path in sorted((root / package).rglob("*.py")):
-            hashed.update(f"{path.relative_to(root).as_posix()}\n".encode())
-            hashed.update(path.read_bytes())
-    names = ("ringrig", *_LIBRARIES)
-    libraries = ("python", python_version()), *((n, _version(n)) for n in names)
+def _here() -> tuple[str, dict[str, str], str]:
     config = np.show_config(mode="dicts") or {}
     found = config.get("SIMD Extensions", {}).get("found", [])
-    return hashed.hexdigest(), libraries, " ".join((machine(), *found))
-
-
-def _version(name: str) -> str:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return "none"
+    libraries = {"python": python_version(), **versions()}
+    return sources_hash(), libraries, " ".join((machine(), *found))

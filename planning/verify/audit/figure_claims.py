@@ -74,15 +74,13 @@ def compare_figures(
 
 
 def compare_exactly(
-    recorded: ReconstructionRecord | None, fresh: ReconstructionRecord
+    recorded: ReconstructionRecord, fresh: ReconstructionRecord
 ) -> list[str]:
     """Return where a recorded reconstruction isn't to the last digit one run again.
 
     For what made it and its seed are the same: then so is every figure. What it says of
     passing is another claim (`compare_figures`).
     """
-    if recorded is None:
-        return []
     findings = AuditFindings("reconstruction")
     documents = (record.to_document() for record in (recorded, fresh))
     claimed, again = (

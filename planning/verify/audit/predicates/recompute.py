@@ -194,8 +194,9 @@ def reachable_by(
         return steps.max(axis=0, initial=0)
 
     beyond = actual.lit & ~actual.measured
-    light = _furthest(others, lights, ~actual.lit, LIT, rng)
-    pair = _furthest(reference_cameras(plan), measures, beyond, MEASURED, rng)
+    threads = shadow.caster.threads
+    light = _furthest(others, lights, ~actual.lit, LIT, rng, threads)
+    pair = _furthest(reference_cameras(plan), measures, beyond, MEASURED, rng, threads)
     by_cameras = actual.measured | (pair == MEASURED)
     pair[actual.measured] = MEASURED
     return Reachable(actual.lit | (light == LIT), by_cameras, light, pair)
@@ -207,6 +208,7 @@ def _furthest(
     wanted: Mask,
     every: int,
     rng: np.random.Generator,
+    threads: int,
 ) -> Steps:
     """Most limits that any device passes on wanted samples, 0 on others, (n,)."""
     furthest = np.zeros(len(wanted), dtype=np.int8)
@@ -221,8 +223,8 @@ def _furthest(
             waiting = waiting[steps < every]
 
     # Each sample is looked at by itself: no result depends on the parts.
-    every_one = np.flatnonzero(wanted)
-    mapped(search, np.array_split(every_one, 1 + len(every_one) // _PART))
+    chosen = np.flatnonzero(wanted)
+    mapped(search, np.array_split(chosen, 1 + len(chosen) // _PART), threads)
     return furthest
 
 
