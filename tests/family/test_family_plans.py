@@ -58,11 +58,11 @@ def few(with_little_work):
         yield
 
 
-def planned(rig, meshes, **asked):
+def planned(rig, meshes, max_projectors=4, **asked):
     return plan_rig(
         meshes,
         rig,
-        max_projectors=4,
+        max_projectors=max_projectors,
         target="surface",
         check=False,
         on_miss="return",
@@ -95,6 +95,22 @@ def test_plates_that_face_apart_take_twice_what_one_takes(both, rig, few):
         assert (told.lower_bound, told.needed, told.hardest.count) == (2, 2, 1)
         # Each alone proves no more than what it takes for itself.
         assert told.over_poses.lower_bound == 1
+
+
+def test_a_member_that_is_short_of_devices_says_what_it_takes(rig, few):
+    """One device can't serve a pair of plates back to back; another member takes one."""
+    pair = TriangleMesh.joined([plate(1), plate(-1, 0.04)])
+    family = planned(rig, [pair, plate(1)], max_projectors=1)
+    short, served = family.members
+    proof = short.document.certificates.projectors
+    assert (proof.status, proof.count) == ("infeasible", 1)
+    assert (proof.needed.count, proof.needed.lower_bound, proof.alone) == (2, 2, 2)
+    areas = short.coverage.target
+    assert proof.best_area.value_m2 == pytest.approx(areas.lit_m2, rel=0.05)
+    assert proof.best_area.upper_bound_m2 < proof.required_m2
+    assert served.document.certificates.projectors.status == "optimal"
+    for member in family.members:
+        assert verify_plan(member, check_pixels=False).failures == ()
 
 
 def test_no_plate_is_in_the_way_of_the_other(both):

@@ -113,18 +113,23 @@ def member_partial(
     projectors, cameras = partial.final_projectors, partial.cameras
     rings = None if partial.rings is None else partial.rings.on(ready.scene)
     stage, views = needs.projectors, needs.cameras
+    lights = _places(partial.stage.projectors, stage.candidates.projectors)
+    sights = _places(partial.camera_stage.cover.cameras, views.reference)
+    lit_m2 = _area_m2(stage.candidates.lit[:, lights], stage.candidates.samples)
+    seen = views.cover.measured[:, sights]
+    measured_m2 = _area_m2(seen, views.cover.samples.target)
     return replace(
         partial,
         ready=ready,
         stage=replace(
             stage,
             by_count={len(projectors): projectors},
-            certificate=_of_count(stage.certificate, len(projectors)),
+            certificate=_of_count(stage.certificate, len(projectors), lit_m2),
         ),
         camera_stage=replace(
             views,
             by_count={len(cameras): cameras},
-            certificate=_of_count(views.certificate, len(cameras)),
+            certificate=_of_count(views.certificate, len(cameras), measured_m2),
             cameras=cameras,
         ),
         rings=rings,
@@ -199,19 +204,31 @@ def _certificate(
     )
 
 
-def _of_count(proof: Certificate, count: int) -> Certificate:
-    """What a member's certificate is of as many devices as the family has."""
-    least = proof.candidates.lower_bound
-    one_fewer = proof.one_fewer
-    if least >= count:
-        # Where so many are proved too few, they fall short by a sample at least.
-        short = proof.required_m2 * (1.0 - 1e-6)
-        one_fewer = OneFewer(upper_bound_m2=short)
+def _of_count(proof: Certificate, count: int, found_m2: float) -> Certificate:
+    """What a member's certificate is of as many devices as the family has.
+
+    Of these, those that stand at candidates cover `found_m2`.
+    """
+    least, needed, best = proof.candidates.lower_bound, proof.needed.count, {}
+    # Where so many are proved too few, they fall short by a sample at least.
+    short = OneFewer(upper_bound_m2=proof.required_m2 * (1.0 - 1e-6))
+    status = "optimal" if least >= count else "feasible"
+    if needed > count:
+        most = short if least > count else proof.best_area
+        area = BestArea(value_m2=found_m2, upper_bound_m2=most.upper_bound_m2)
+        status, best = "infeasible", {"best_area": area}
     return proof.changed(
         count=count,
-        status="optimal" if least >= count else "feasible",
+        status=status,
+        candidates=proof.candidates.changed(lower_bound=min(least, count)),
         greedy_count=max(count, proof.greedy_count),
-        needed=NeededCount(count=count, lower_bound=least),
-        one_fewer=one_fewer,
-        alone=proof.needed.count,
+        needed=NeededCount(count=max(needed, count), lower_bound=least),
+        one_fewer=short if least >= count else proof.one_fewer,
+        alone=needed,
+        **best,
     )
+
+
+def _area_m2(covers: np.ndarray, samples: Target) -> float:
+    """Area of the samples that any device covers; shape (n, n_devices)."""
+    return int(np.any(covers, axis=1).sum()) * samples.samples.weight
