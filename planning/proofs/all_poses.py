@@ -26,8 +26,8 @@ class Effort:
     """What is spent on a bound.
 
     Attributes:
-        finest: Cells are parts of a cube map of 2^finest cells an edge. Of cameras, of
-            one twice as fine where the first search leaves room.
+        finest: Cells are parts of a cube map of 2^finest cells an edge. Cameras' are,
+            where rougher ones without shadows leave room.
         budget: Counted work of a search.
         shadows: Pairs of sample and face above which shadows are left out.
         most_samples: Samples of the cover at most; None: all that it has.

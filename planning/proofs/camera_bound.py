@@ -35,12 +35,14 @@ from solvers.cells.cell_bound import CellStatus
 
 from .all_poses import BoundQuestion, ContinuousBound, Effort
 
+# Levels by which cells without shadows are rougher than those among them.
+_ROUGHER = 2
 DEFAULT = Effort(
-    finest=7, aims=None, maps=5, budget=1.5e9, shadows=3e8, most_samples=2000
+    finest=8, aims=None, maps=5, budget=1.5e9, shadows=3e8, most_samples=2000
 )
 # Of what is asked only to spare a search: rough cells, no shadows.
 ROUGH = replace(DEFAULT, shadows=0.0, budget=3e8)
-PROVE = Effort(finest=8, aims=5, maps=7, budget=1e10, shadows=np.inf)
+PROVE = Effort(finest=9, aims=5, maps=7, budget=1e10, shadows=np.inf)
 
 
 def bound_cameras(
@@ -117,20 +119,19 @@ def camera_trees(
         )
 
     # The roughest says soon whether shadows are needed at all.
-    yield positions(max(effort.finest - 1, 0), None), False
+    yield positions(max(effort.finest - _ROUGHER, 0), None), False
     near = space.camera_radius_m[0]
     shadows = len(samples.target) * len(
         scene.mesh.faces
     ) <= effort.shadows and near >= mesh_reach(scene)
     maps = _shadow_maps(scene, samples.target, effort.maps) if shadows else None
-    yield positions(effort.finest, maps), shadows
-    yield positions(effort.finest + 1, maps), shadows
+    finest = positions(effort.finest, maps)
+    yield finest, shadows
     reach = float(lengths(drawn.points - np.array(space.centre)).max())
     # Where a camera that looks at the centre misses no sample, aims forbid nothing.
     if effort.aims is not None and not any(d.holds_ball(reach, near) for d in devices):
-        finer = positions(effort.finest + 1, maps)
         widest = max(image_cone(device).half_angle for device in devices)
-        yield AimTree(finer, widest, finest=effort.aims), shadows
+        yield AimTree(finest, widest, finest=effort.aims), shadows
 
 
 def _shadow_maps(scene: Scene, samples: Target, finest: int) -> WidenedMaps:

@@ -41,7 +41,7 @@ from planning.scene.samples import LightOnSamples
 from planning.scene.workspace.candidates import aimed_poses
 from solvers.cells.cell_bound import CellStatus
 
-EFFORT = all_poses.Effort(finest=5, aims=4, maps=5, budget=1e9, shadows=np.inf)
+EFFORT = all_poses.Effort(finest=6, aims=4, maps=5, budget=1e9, shadows=np.inf)
 UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -170,7 +170,7 @@ def test_no_pose_measures_what_its_cells_lack(mesh, name, attack_cameras):
     device = LENSES[name]
     tight = LOOSER if name != "long" else TIGHT | {"max_sample_distance_m": 1.4e-4}
     scene, projectors, rows = shown(mesh, device, tight)
-    levels = (5, 6) if name == "long" else (5, 4)
+    levels = (7, 6) if name == "long" else (7, 4)
     trees = attack_cameras.trees_of(scene, device, rows, *levels)
     assert ("by aim" in trees) == (name == "long")
     assert "among shadows" in trees
@@ -511,7 +511,7 @@ def test_cameras_inside_the_object_cast_no_shadows_that_are_relied_on():
         scene = scene_of(PLATES, limits=FREE, camera_radius_m=(radius, 1.2))
         trees = camera_trees(scene, (lens(),), everything_lit(scene, 50), EFFORT)
         assert any(shadows for _, shadows in trees) == counted
-        found = bounded(scene, 0.45, 3, n=50, effort=replace(EFFORT, finest=2))
+        found = bounded(scene, 0.45, 3, n=50, effort=replace(EFFORT, finest=3))
         assert found.shadows == (counted or found.found.status is CellStatus.PROVED)
 
 
@@ -542,7 +542,7 @@ def test_a_certificate_says_what_holds_over_all_poses(given):
     scene, stage = staged(existing)
     assert stage.certificate.continuous is None
     device = load_rig("default").camera_device()
-    found = bound_stage(scene, stage, (device,), replace(EFFORT, finest=6))
+    found = bound_stage(scene, stage, (device,), replace(EFFORT, finest=7))
     proof = found.certificate.to_document()
     entry, needed = proof["continuous"], proof["needed"]
     assert given < entry["lower_bound"] <= needed["count"]
