@@ -24,6 +24,7 @@ from planning.proofs.cells.direction_cells import (
     mesh_reach,
     open_samples,
 )
+from planning.proofs.cells.lit_cells import LitCells
 from planning.proofs.cells.position_cells import PositionTree
 from planning.scene.lights import light_of
 from planning.scene.samples import Target
@@ -34,8 +35,8 @@ from solvers.cells.cell_bound import CellBound, CellStatus
 
 from .all_poses import BoundQuestion, ContinuousBound, Effort
 
-DEFAULT = Effort(finest=6, budget=1.5e9, shadows=3e8, most_samples=2000)
-PROVE = Effort(finest=7, budget=6e10, shadows=np.inf, offers=150)
+DEFAULT = Effort(finest=6, maps=6, budget=1.5e9, shadows=3e8, most_samples=2000)
+PROVE = Effort(finest=7, maps=7, budget=6e10, shadows=np.inf, offers=150)
 
 
 def bound_projectors(
@@ -57,7 +58,7 @@ def bound_projectors(
         # What is required takes one, with shadows or without: no cell is looked at.
         effort = replace(effort, finest=0, shadows=0.0)
     shadows = bool(len(samples) * len(scene.mesh.faces) <= effort.shadows)
-    cube, required = CubeMap(1 << effort.finest), scene.requirements.projector
+    required = scene.requirements.projector
     limits = DirectionLimits(required.max_incidence, required.min_tangent_angle)
     workspace = scene.requirements.workspace
     devices = [template.device for template in templates]
@@ -68,6 +69,7 @@ def bound_projectors(
     aside = reach + widest if parallel else 0.0
     depth = float(np.sqrt(max(0.0, near**2 - aside**2)))
     shadows = shadows and bool(depth >= reach)
+    cube = CubeMap(1 << (effort.finest if parallel else effort.maps))
     opened = open_samples(
         scene, limits, samples, cube, shadows=shadows, nearest_m=depth
     )
@@ -86,6 +88,7 @@ def bound_projectors(
             samples.samples.points,
             WidenedMaps(opened, cube),
             finest=effort.finest,
+            limits=LitCells(samples, required),
         )
     bound = question.searched(tree, effort.budget)
     unrefuted = np.empty((0, 3))

@@ -21,6 +21,7 @@ from planning.scene.workspace.admissible import may_be_admissible
 from solvers.bit_rows import parts
 
 from .grown_tree import GrownTree
+from .lit_cells import LitCells
 from .measurable_cells import MeasurableCells
 from .seen_cells import SeenCells
 from .shell_cells import Seen, ShellCells, directions_of, seen_from
@@ -51,7 +52,7 @@ class PositionTree(GrownTree):
         maps: WidenedMaps | None,
         *,
         finest: int,
-        limits: MeasurableCells | SeenCells | None = None,
+        limits: LitCells | MeasurableCells | SeenCells | None = None,
     ) -> None:
         self._workspace, self._range = workspace, range_m
         self._points = points - np.array(workspace.centre)
