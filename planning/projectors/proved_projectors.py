@@ -90,8 +90,15 @@ def bound_of(
         samples.samples.weight * len(samples),
         RegionFloors.of(scene, samples.take(np.arange(n))),
     )
-    wanted = samples.take(np.flatnonzero(reached & ~free))
-    return bound_projectors(scene, templates, wanted, question, effort)
+    wanted = np.flatnonzero(reached & ~free)
+    return bound_projectors(
+        scene,
+        templates,
+        samples.take(wanted),
+        question,
+        effort,
+        stage.candidates.lit[wanted].T,
+    )
 
 
 def _lit_by_existing(

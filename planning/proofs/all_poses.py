@@ -103,14 +103,17 @@ class BoundQuestion:
             regions.row[reached & ~free],
         )
 
-    def searched(self, tree: CellTree, budget: float) -> CellBound:
+    def searched(
+        self, tree: CellTree, budget: float, known: NDArray[np.bool_] | None = None
+    ) -> CellBound:
         """Return what a search over cells of poses proves.
 
         What is required of all alone comes first: what it proves holds with floors.
+        What some poses cover of the tree's samples, (k, n_rows), guides the search.
         """
         required = np.array([float(self.required)])
         problem = CellProblem(np.ones(tree.n_rows), required)
-        bound = bound_count(problem, tree, self.count, budget=budget)
+        bound = bound_count(problem, tree, self.count, known=known, budget=budget)
         if bound.status is CellStatus.PROVED or not any(self.floors):
             return bound
         floored = CellProblem(
@@ -120,7 +123,7 @@ class BoundQuestion:
             self.regions,  # pyright: ignore[reportArgumentType]
             float(self.required),
         )
-        again = bound_count(floored, tree, self.count, budget=budget)
+        again = bound_count(floored, tree, self.count, known=known, budget=budget)
         return again if again.lower_bound > bound.lower_bound else bound
 
 

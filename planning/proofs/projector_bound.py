@@ -45,13 +45,15 @@ def bound_projectors(
     samples: Target,
     question: BoundQuestion,
     effort: Effort,
+    known: NDArray[np.bool_] | None = None,
 ) -> ContinuousBound:
     """Bound the projectors over every pose of the workspace.
 
     Field of view, beam and rings are left out: the bound holds for any of them. Of
     several models it is of the range that any has, and of any number of each.
 
-    The samples are those that some candidate lights and no existing projector does.
+    The samples are those that some candidate lights and no existing projector does;
+    which of them each candidate lights, (k, n), guides the search.
     """
     reach = mesh_reach(scene)
     if question.count <= 1:
@@ -90,7 +92,7 @@ def bound_projectors(
             finest=effort.finest,
             limits=LitCells(samples, required),
         )
-    bound = question.searched(tree, effort.budget)
+    bound = question.searched(tree, effort.budget, known)
     unrefuted = np.empty((0, 3))
     if bound.status in (CellStatus.SURVIVED, CellStatus.CUT):
         unrefuted = _promising(bound, tree, effort.offers)

@@ -74,6 +74,7 @@ def bound_count(
     tree: CellTree,
     count: int,
     *,
+    known: NDArray[np.bool_] | None = None,
     budget: float = DEFAULT_BUDGET,
     time_limit: float = float("inf"),
 ) -> CellBound:
@@ -83,6 +84,8 @@ def bound_count(
         problem: What must be served.
         tree: Cells that hold every pose of the workspace.
         count: Poses that are known to be enough.
+        known: Which rows some poses of the workspace serve, shape (k, n_rows). They
+            guide the search; what it proves doesn't rest on them.
         budget: Counted work, about 1e9 a second.
         time_limit: Wall time that cuts the work, in [s]; the proof then says so.
 
@@ -96,18 +99,25 @@ def bound_count(
             f"the tree's cells have {tree.n_rows} rows, the problem has "
             f"{problem.weights.size}"
         )
-    return _Proof(problem, tree, count, WorkBudget(budget, time_limit=time_limit)).run()
+    limit = WorkBudget(budget, time_limit=time_limit)
+    return _Proof(problem, tree, count, limit, known).run()
 
 
 class _Proof:
     def __init__(
-        self, problem: CellProblem, tree: CellTree, count: int, budget: WorkBudget
+        self,
+        problem: CellProblem,
+        tree: CellTree,
+        count: int,
+        budget: WorkBudget,
+        known: NDArray[np.bool_] | None,
     ) -> None:
         self.problem, self.tree, self.count, self.budget = problem, tree, count, budget
         self.whole = whole_rows(problem)
         self.store = CellStore(tree, budget)
         share = budget.part(_MULTIPLIERS_SHARE * budget.units)
-        self.search = MultiplierSearch(self.whole, self.store, share)
+        rows = None if known is None else pack_rows(known)
+        self.search = MultiplierSearch(self.whole, self.store, share, rows)
         self.lower, self.proof = 0, "nothing is required of poses"
         self.survivor: NDArray[np.int64] | None = None
 
