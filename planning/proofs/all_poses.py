@@ -26,14 +26,15 @@ class Effort:
     """What is spent on a bound.
 
     Attributes:
-        finest: Cells are parts of a cube map of 2^finest cells an edge. Of cameras, of
-            one twice as fine where the first search leaves room.
+        finest: Cells of positions are parts of a cube map of 2^finest cells an edge. Of
+            cameras, of one twice as fine where the first search leaves room.
         budget: Counted work of a search.
         shadows: Pairs of sample and face above which shadows are left out.
         most_samples: Samples of the cover at most; None: all that it has.
         offers: Poses offered, beside cells that can't be refuted, where the bound
             leaves room for fewer projectors.
-        maps: As `finest`, of the maps in which cameras' shadows are drawn.
+        maps: As `finest`, of the maps in which shadows are drawn; in parallel light
+            their cells are those that are searched.
         aims: As `finest`, of the aims of cameras whose image the object overflows;
             None: cells aren't cut by aim.
     """

@@ -35,8 +35,8 @@ from solvers.cells.cell_bound import CellBound, CellStatus
 
 from .all_poses import BoundQuestion, ContinuousBound, Effort
 
-DEFAULT = Effort(finest=6, maps=6, budget=1.5e9, shadows=3e8, most_samples=2000)
-PROVE = Effort(finest=7, maps=7, budget=6e10, shadows=np.inf, offers=150)
+DEFAULT = Effort(finest=8, maps=6, budget=2.5e9, shadows=3e8, most_samples=2000)
+PROVE = Effort(finest=9, maps=7, budget=4.5e10, shadows=np.inf, offers=150)
 
 
 def bound_projectors(
@@ -58,7 +58,7 @@ def bound_projectors(
     reach = mesh_reach(scene)
     if question.count <= 1:
         # What is required takes one, with shadows or without: no cell is looked at.
-        effort = replace(effort, finest=0, shadows=0.0)
+        effort = replace(effort, finest=0, maps=0, shadows=0.0)
     shadows = bool(len(samples) * len(scene.mesh.faces) <= effort.shadows)
     required = scene.requirements.projector
     limits = DirectionLimits(required.max_incidence, required.min_tangent_angle)
@@ -71,7 +71,7 @@ def bound_projectors(
     aside = reach + widest if parallel else 0.0
     depth = float(np.sqrt(max(0.0, near**2 - aside**2)))
     shadows = shadows and bool(depth >= reach)
-    cube = CubeMap(1 << (effort.finest if parallel else effort.maps))
+    cube = CubeMap(1 << effort.maps)
     opened = open_samples(
         scene, limits, samples, cube, shadows=shadows, nearest_m=depth
     )

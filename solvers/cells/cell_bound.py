@@ -22,7 +22,7 @@ from .cell_tree import CellTree
 from .cell_tuples import Enough, refute_tuples
 
 DEFAULT_BUDGET = 2e10
-_MULTIPLIERS_SHARE = 0.5
+_MULTIPLIERS_SHARE = 0.75
 
 
 class CellStatus(enum.Enum):

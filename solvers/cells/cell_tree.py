@@ -58,6 +58,11 @@ class CellTree(Protocol):
         """Number of rows, that is of bits that count."""
         ...
 
+    @property
+    def units_per_pair(self) -> float:
+        """Work of asking whether a child serves a row of its parent."""
+        ...
+
     def roots(self) -> CellBatch:
         """Return the cells that hold every pose together."""
         ...

@@ -23,7 +23,7 @@ from planning.scene.scene import Scene
 from solvers.bit_rows import pack_rows, unpack_rows
 from solvers.cells.cell_bound import CellStatus
 
-QUICK = Effort(finest=6, budget=1e9, shadows=np.inf)
+QUICK = Effort(finest=6, maps=6, budget=1e9, shadows=np.inf)
 RADII = np.array([0.1, 0.45])
 
 
@@ -351,7 +351,7 @@ def test_devices_inside_the_object_cast_no_shadows_that_are_relied_on():
     """Where the shell cuts the object, something may stand behind the device."""
     mesh = SHAPES["box over a plate"]
     for light in ("parallel", "diverging"):
-        effort = replace(QUICK, finest=4)
+        effort = replace(QUICK, finest=4, maps=4)
         shell = {"projector_radius_m": (0.05, 1.2), "n": 100}
         found = bounded(mesh, light, 0.3, 2, effort, **shell)
         assert not found.shadows

@@ -98,9 +98,10 @@ class AimTree(GrownTree):
         # Of cells with every aim nothing is asked.
         middles, radii = directions_of(self._cubes, np.maximum(level, 0), aim)
         cells = self.positions.cells(place)
+        facing = self.positions.facing(cells)
         for pairs in parts(at.size, PAIRS):
             cell, sample = at[pairs], samples[pairs]
-            seen = self.positions.seen_from(cells, cell, sample)
+            seen = self.positions.seen_from(cells, facing, cell, sample)
             cosine = -np.einsum("ij,ij->i", middles[cell], seen.towards)
             reach = self._beta + radii[cell] + seen.psi + _ROUNDING
             passed = cosine >= np.cos(np.minimum(reach, np.pi)) - _ROUNDING

@@ -14,6 +14,7 @@ e = |P - C| + h, at a distance of at least r::
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,8 @@ class DirectionTree:
 
     levels: tuple[NDArray[np.uint64], ...]
     n_rows: int
+    # All rows are there before the search.
+    units_per_pair: ClassVar[float] = 0.0
 
     @classmethod
     def over(cls, leaves: NDArray[np.uint64], n_rows: int) -> "DirectionTree":

@@ -14,6 +14,9 @@ from solvers.cells.cell_tree import CellBatch
 class GrownTree(ABC):
     """Keeps the cells made so far, and the bit row of each."""
 
+    # Of geometry, on a quiet machine.
+    units_per_pair = 150.0
+
     def __init__(self, roots: Sequence[NDArray[Any]], n_rows: int) -> None:
         self.n_rows, self._n_roots = n_rows, len(roots[0])
         self._made: dict[int, NDArray[np.int64]] = {}

@@ -24,7 +24,7 @@ from .grown_tree import GrownTree
 from .lit_cells import LitCells
 from .measurable_cells import MeasurableCells
 from .seen_cells import SeenCells
-from .shell_cells import Seen, ShellCells, directions_of, seen_from
+from .shell_cells import Facing, Seen, ShellCells, directions_of, seen_from
 
 # Pairs of cell and sample looked at together: they stay in the second-level cache.
 PAIRS = 1 << 13
@@ -97,10 +97,11 @@ class PositionTree(GrownTree):
         self, columns: Sequence[NDArray[Any]], may: NDArray[np.bool_]
     ) -> NDArray[np.bool_]:
         cells, covered = ShellCells(*columns), np.zeros_like(may)
-        at, samples = np.nonzero(may & self._admissible(cells)[:, None])
+        facing = self.facing(cells)
+        at, samples = np.nonzero(may & self._admissible(cells, facing)[:, None])
         for pairs in parts(at.size, PAIRS):
             cell, sample = at[pairs], samples[pairs]
-            passed = self._passed(cells, cell, sample)
+            passed = self._passed(self.seen_from(cells, facing, cell, sample), sample)
             covered[cell[passed], sample[passed]] = True
         return covered
 
@@ -112,18 +113,23 @@ class PositionTree(GrownTree):
         deep = 0.5 * (cells.high_m - cells.low_m) * self._reach / cells.low_m
         return (side + deep) / cells.low_m
 
-    def seen_from(
-        self, cells: ShellCells, at: NDArray[np.int64], samples: NDArray[np.int64]
-    ) -> Seen:
-        """Return how samples see cells."""
-        directions = directions_of(self._cubes, cells.level, cells.cell)
-        return seen_from(cells, directions, at, self._points[samples])
+    def facing(self, cells: ShellCells) -> Facing:
+        """Return where cells are from the centre, for `seen_from`."""
+        return directions_of(self._cubes, cells.level, cells.cell)
 
-    def _passed(
-        self, cells: ShellCells, at: NDArray[np.int64], samples: NDArray[np.int64]
-    ) -> NDArray[np.int64]:
+    def seen_from(
+        self,
+        cells: ShellCells,
+        facing: Facing,
+        at: NDArray[np.int64],
+        samples: NDArray[np.int64],
+    ) -> Seen:
+        """Return how samples see cells; `facing` is that of all of these."""
+        return seen_from(cells, facing, at, self._points[samples])
+
+    def _passed(self, seen: Seen, samples: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the pairs of cell and sample that a device in the cell may cover."""
-        seen, (near, far) = self.seen_from(cells, at, samples), self._range
+        near, far = self._range
         ranged = seen.distance - seen.extent <= far
         pairs = np.flatnonzero(ranged & (seen.distance + seen.extent >= near))
         if self._limits is not None:
@@ -137,8 +143,8 @@ class PositionTree(GrownTree):
             pairs = pairs[self._maps.open(view.towards, view.psi, samples[pairs])]
         return pairs
 
-    def _admissible(self, cells: ShellCells) -> NDArray[np.bool_]:
+    def _admissible(self, cells: ShellCells, facing: Facing) -> NDArray[np.bool_]:
         """Return which cells may hold a position that all limits allow, shape (n,)."""
-        outwards, angle = directions_of(self._cubes, cells.level, cells.cell)
+        outwards, angle = facing
         low_m, high_m = cells.low_m, cells.high_m
         return may_be_admissible(self._workspace, outwards, angle, low_m, high_m)
