@@ -90,6 +90,7 @@ def bound_projectors(
             samples.samples.points,
             WidenedMaps(opened, cube),
             finest=effort.finest,
+            closed=WidenedMaps(~opened, cube),
             limits=LitCells(samples, required),
         )
     bound = question.searched(tree, effort.budget, known)

@@ -114,8 +114,9 @@ class _Proof:
     ) -> None:
         self.problem, self.tree, self.count, self.budget = problem, tree, count, budget
         self.whole = whole_rows(problem)
-        self.store = CellStore(tree, budget)
         share = budget.part(_MULTIPLIERS_SHARE * budget.units)
+        # Cells that are made count in both.
+        self.store = CellStore(tree, share)
         rows = None if known is None else pack_rows(known)
         self.search = MultiplierSearch(self.whole, self.store, share, rows)
         self.lower, self.proof = 0, "nothing is required of poses"

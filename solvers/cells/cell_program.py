@@ -25,7 +25,7 @@ from solvers.status import WorkBudget
 from .cell_problem import WholeRows
 
 # Work of one simplex iteration for each row and pose in hand.
-_UNITS_PER_ENTRY = 0.7
+_UNITS_PER_ENTRY = 0.25
 
 
 @dataclass(frozen=True, eq=False)

@@ -95,14 +95,14 @@ class CellStore:
     def _ask(self, parents: NDArray[np.int64]) -> None:
         if self.full:
             return
+        before = self.tree.units
         batch = self.tree.children(self.names[parents])
+        self._budget.spend(self.tree.units - before)
         if (self.size + batch.cells.size) * self._words * 8 > MAX_BYTES:
             self.full = True
             return
         self._check(parents, batch)
         number = np.bincount(batch.parents, minlength=parents.size)
-        asked = np.bitwise_count(self.rows[parents]).sum(axis=1, dtype=np.int64)
-        self._budget.spend(self.tree.units_per_pair * float(asked @ number))
         self._number.values[parents] = number
         self._first.values[parents] = self.size + np.cumsum(number) - number
         self._append(batch, self.levels[parents[batch.parents]] + 1)

@@ -59,8 +59,8 @@ class CellTree(Protocol):
         ...
 
     @property
-    def units_per_pair(self) -> float:
-        """Work of asking whether a child serves a row of its parent."""
+    def units(self) -> float:
+        """Counted work of making the cells that were handed out so far."""
         ...
 
     def roots(self) -> CellBatch:

@@ -27,7 +27,7 @@ class ArrayTree:
     parents: NDArray[np.int64]
     rows: NDArray[np.uint64]
     n_rows: int
-    units_per_pair: ClassVar[float] = 0.0
+    units: ClassVar[float] = 0.0
     _order: NDArray[np.int64] = field(init=False, repr=False)
     _starts: NDArray[np.int64] = field(init=False, repr=False)
 

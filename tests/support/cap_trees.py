@@ -18,7 +18,7 @@ SLACK = 1e-9
 class CapTree:
     """Cells around centres; subclasses say which."""
 
-    units_per_pair = 0.0
+    units = 0.0
 
     def __init__(self, points, radius, depth):
         self.points = np.asarray(points, dtype=float)

@@ -90,8 +90,11 @@ class AimTree(GrownTree):
         return owner, place, level + 1, aims
 
     def _coverage(
-        self, columns: Sequence[NDArray[Any]], may: NDArray[np.bool_]
-    ) -> NDArray[np.bool_]:
+        self,
+        columns: Sequence[NDArray[Any]],
+        may: NDArray[np.bool_],
+        sure: NDArray[np.bool_],
+    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         place, level, aim = columns
         covered = may & self.positions.covered(place)
         at, samples = np.nonzero(covered & (level != _EVERY)[:, None])
@@ -106,4 +109,4 @@ class AimTree(GrownTree):
             reach = self._beta + radii[cell] + seen.psi + _ROUNDING
             passed = cosine >= np.cos(np.minimum(reach, np.pi)) - _ROUNDING
             covered[cell, sample] = passed
-        return covered
+        return covered, sure

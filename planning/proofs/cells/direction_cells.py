@@ -40,7 +40,7 @@ class DirectionTree:
     levels: tuple[NDArray[np.uint64], ...]
     n_rows: int
     # All rows are there before the search.
-    units_per_pair: ClassVar[float] = 0.0
+    units: ClassVar[float] = 0.0
 
     @classmethod
     def over(cls, leaves: NDArray[np.uint64], n_rows: int) -> "DirectionTree":

@@ -45,9 +45,24 @@ class LitCells:
             nearest: Ignored: no limit of projectors asks for it.
             psi: Angle about `towards` that holds the cell [rad], shape (k,).
         """
-        cone = Cone.of(towards, psi)
-        facing = nearest_cos(dot(self._normals[samples], towards), cone)
-        along = farthest_cos(np.abs(dot(self._steep[samples], towards)), cone)
-        return may_hold(
-            PROJECTOR_LIMITS, LightCell(facing, along), self._limits, len(samples)
-        )
+        cone, facing, along = self._cosines(samples, towards, psi)
+        best = LightCell(nearest_cos(facing, cone), farthest_cos(along, cone))
+        return may_hold(PROJECTOR_LIMITS, best, self._limits, len(samples))
+
+    def surely(
+        self, samples: NDArray[np.int64], towards: _Array, psi: _Array
+    ) -> NDArray[np.bool_]:
+        """Return which samples every part of a cell admits, likewise."""
+        cone, facing, along = self._cosines(samples, towards, psi)
+        least = facing * cone.cosine - np.sqrt(1.0 - facing**2) * cone.sine
+        worst = LightCell(least, nearest_cos(along, cone))
+        holds = may_hold(PROJECTOR_LIMITS, worst, self._limits, len(samples))
+        return holds & (psi < 0.5 * np.pi)
+
+    def _cosines(
+        self, samples: NDArray[np.int64], towards: _Array, psi: _Array
+    ) -> tuple[Cone, _Array, _Array]:
+        """Return the cones about directions, and N.u and |T1.u| of their middles."""
+        facing = np.clip(dot(self._normals[samples], towards), -1.0, 1.0)
+        along = np.abs(dot(self._steep[samples], towards))
+        return Cone.of(towards, psi), facing, along

@@ -40,6 +40,8 @@ class PositionTree(GrownTree):
         points: Samples in [m], shape (n_rows, 3).
         maps: Directions that are open to each sample, widened; None: all are.
         finest: Level beyond which directions aren't split.
+        closed: Directions that aren't, widened: where none is near, parts of a cell
+            need no look. None: all are looked at.
         limits: What else forbids samples; None: nothing.
     """
 
@@ -52,12 +54,14 @@ class PositionTree(GrownTree):
         maps: WidenedMaps | None,
         *,
         finest: int,
+        closed: WidenedMaps | None = None,
         limits: LitCells | MeasurableCells | SeenCells | None = None,
     ) -> None:
         self._workspace, self._range = workspace, range_m
         self._points = points - np.array(workspace.centre)
         self._reach = float(np.linalg.norm(self._points, axis=1).max(initial=0.0))
-        self._maps, self._finest, self._limits = maps, finest, limits
+        self._maps, self._closed = maps, closed
+        self._finest, self._limits = finest, limits
         self._cubes = [CubeMap(1 << level) for level in range(finest + 1)]
         whole, (low, high) = np.arange(FACES), radius_m
         faces = ShellCells(0 * whole, whole, np.full(FACES, low), np.full(FACES, high))
@@ -94,16 +98,24 @@ class PositionTree(GrownTree):
         return owner, [np.concatenate(both) for both in zip(*finer, strict=True)]
 
     def _coverage(
-        self, columns: Sequence[NDArray[Any]], may: NDArray[np.bool_]
-    ) -> NDArray[np.bool_]:
-        cells, covered = ShellCells(*columns), np.zeros_like(may)
+        self,
+        columns: Sequence[NDArray[Any]],
+        may: NDArray[np.bool_],
+        sure: NDArray[np.bool_],
+    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        cells = ShellCells(*columns)
         facing = self.facing(cells)
-        at, samples = np.nonzero(may & self._admissible(cells, facing)[:, None])
+        sure = sure & self._admissible(cells, facing)[:, None]
+        covered = sure.copy()
+        at, samples = np.nonzero(may & ~sure & self._admissible(cells, facing)[:, None])
         for pairs in parts(at.size, PAIRS):
             cell, sample = at[pairs], samples[pairs]
-            passed = self._passed(self.seen_from(cells, facing, cell, sample), sample)
+            seen = self.seen_from(cells, facing, cell, sample)
+            passed = self._passed(seen, sample)
             covered[cell[passed], sample[passed]] = True
-        return covered
+            certain = passed[self._certain(seen.take(passed), sample[passed])]
+            sure[cell[certain], sample[certain]] = True
+        return covered, sure
 
     def widths(self, names: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return about how wide cells look from the centre [rad], shape (n,)."""
@@ -142,6 +154,24 @@ class PositionTree(GrownTree):
             view = seen.take(pairs)
             pairs = pairs[self._maps.open(view.towards, view.psi, samples[pairs])]
         return pairs
+
+    def _certain(self, seen: Seen, samples: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return of which pairs no part of the cell would be found to miss the sample.
+
+        Of cameras that isn't asked.
+        """
+        near, far = self._range
+        if self._closed is None or not isinstance(self._limits, LitCells):
+            return np.zeros(samples.size, dtype=bool)
+        within = (seen.distance - seen.extent >= near) & (
+            seen.distance + seen.extent <= far
+        )
+        within &= self._limits.surely(samples, seen.towards, seen.psi)
+        some = np.flatnonzero(within)
+        within[some] = ~self._closed.open(
+            seen.towards[some], seen.psi[some], samples[some]
+        )
+        return within
 
     def _admissible(self, cells: ShellCells, facing: Facing) -> NDArray[np.bool_]:
         """Return which cells may hold a position that all limits allow, shape (n,)."""
