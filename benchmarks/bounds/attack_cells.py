@@ -415,7 +415,9 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--light", nargs="+", default=LIGHTS, choices=LIGHTS)
     parser.add_argument("--rig-fit", nargs="+", default=FITS[:1], choices=FITS)
     parser.add_argument("--rows", type=int, default=512, help="samples of the target")
-    parser.add_argument("--finest", type=int, default=6, help="maps of 2^finest an edge")
+    parser.add_argument(
+        "--finest", type=int, default=6, help="maps of 2^finest an edge"
+    )
     parser.add_argument("--seed", type=int, default=0)
     return parser.parse_args()
 

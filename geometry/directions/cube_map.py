@@ -106,7 +106,9 @@ class CubeMap:
 
         Like `clearance`, of lines half a step apart.
         """
-        return float(np.arcsin(np.sin(0.25 * np.pi / self.n) * np.sqrt(0.5))) - _ROUNDING
+        return (
+            float(np.arcsin(np.sin(0.25 * np.pi / self.n) * np.sqrt(0.5))) - _ROUNDING
+        )
 
     @cached_property
     def around_corners(self) -> Ints:

@@ -21,7 +21,7 @@ _STATUS: dict[CellStatus, Literal["proved", "survived", "cut"]] = {
 }
 
 # Share of the work for a search that leaves floors of regions out, where there are any.
-_WITHOUT_FLOORS = 0.7
+_WITHOUT_FLOORS = 0.8
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,7 @@ class Effort:
             leaves room for fewer projectors.
         maps: As `finest`, of the maps in which shadows are drawn; in parallel light
             their cells are those that are searched.
+        starts: Searches for projectors between the bound and the count.
         aims: As `finest`, of the aims of cameras whose image the object overflows;
             None: cells aren't cut by aim.
     """
@@ -49,6 +50,7 @@ class Effort:
     offers: int = 0
     maps: int = 0
     aims: int | None = None
+    starts: int = 0
 
 
 @dataclass(frozen=True)
@@ -128,8 +130,14 @@ class BoundQuestion:
             self.regions,  # pyright: ignore[reportArgumentType]
             float(self.required),
         )
-        rest = budget - first
-        again = bound_count(floored, tree, self.count, known=known, budget=rest)
+        again = bound_count(
+            floored,
+            tree,
+            self.count,
+            known=known,
+            least=int(bound.lower_bound),
+            budget=budget - first,
+        )
         return again if again.lower_bound > bound.lower_bound else bound
 
 

@@ -35,8 +35,10 @@ from solvers.cells.cell_bound import CellBound, CellStatus
 
 from .all_poses import BoundQuestion, ContinuousBound, Effort
 
-DEFAULT = Effort(finest=8, maps=6, budget=2.5e9, shadows=3e8, most_samples=2000)
-PROVE = Effort(finest=9, maps=7, budget=4.5e10, shadows=np.inf, offers=150)
+DEFAULT = Effort(
+    finest=8, maps=6, budget=3.5e9, shadows=3e8, most_samples=2000, starts=1
+)
+PROVE = Effort(finest=9, maps=7, budget=4e10, shadows=np.inf, offers=150, starts=4)
 
 
 def bound_projectors(

@@ -75,6 +75,7 @@ def bound_count(
     count: int,
     *,
     known: NDArray[np.bool_] | None = None,
+    least: int = 0,
     budget: float = DEFAULT_BUDGET,
     time_limit: float = float("inf"),
 ) -> CellBound:
@@ -86,6 +87,7 @@ def bound_count(
         count: Poses that are known to be enough.
         known: Which rows some poses of the workspace serve, shape (k, n_rows). They
             guide the search; what it proves doesn't rest on them.
+        least: Poses that were proved to be needed: no fewer are looked at.
         budget: Counted work, about 1e9 a second.
         time_limit: Wall time that cuts the work, in [s]; the proof then says so.
 
@@ -100,7 +102,7 @@ def bound_count(
             f"{problem.weights.size}"
         )
     limit = WorkBudget(budget, time_limit=time_limit)
-    return _Proof(problem, tree, count, limit, known).run()
+    return _Proof(problem, tree, count, limit, known, least).run()
 
 
 class _Proof:
@@ -111,6 +113,7 @@ class _Proof:
         count: int,
         budget: WorkBudget,
         known: NDArray[np.bool_] | None,
+        least: int,
     ) -> None:
         self.problem, self.tree, self.count, self.budget = problem, tree, count, budget
         self.whole = whole_rows(problem)
@@ -119,13 +122,18 @@ class _Proof:
         self.store = CellStore(tree, share)
         rows = None if known is None else pack_rows(known)
         self.search = MultiplierSearch(self.whole, self.store, share, rows)
-        self.lower, self.proof = 0, "nothing is required of poses"
+        self.lower, self.proof = min(least, count), "nothing is required of poses"
+        if least:
+            self.proof = "fewer were refuted before"
         self.survivor: NDArray[np.int64] | None = None
 
     def run(self) -> CellBound:
         if not _reachable(self.whole, self.store):
             proof = "all cells together serve less than is required"
             return self._answer(CellStatus.INFEASIBLE, float("inf"), proof)
+        if self.lower < self.count - 1 and (self.lower or self._refute(0)):
+            # Smaller numbers follow from larger ones.
+            self.search.refute_most(self.count - 1)
         while self.lower < self.count and self._refute(self.lower):
             pass
         if self.lower >= self.count:

@@ -74,12 +74,19 @@ class MultiplierSearch:
         start = whole.multipliers(whole.weights / np.maximum(whole.needs, 1))
         self._record(start, store.costs(store.frontier, start))
 
+    def refute_most(self, n_poses: int) -> None:
+        """Refute at once so many poses, or as many as poses in hand leave room for."""
+        while self.bound <= n_poses:
+            self._prepare(n_poses)
+            proposal = self._proposed()
+            if proposal is None or not proposal.reached:
+                break
+            n_poses -= 1
+        self.refute(n_poses)
+
     def refute(self, n_poses: int) -> bool:
         """Look for multipliers by which so many poses aren't enough."""
-        self._program.set_count(n_poses)
-        if self._spread and self.bound <= n_poses:
-            self._take(self._leaves_about())
-            self._spread = False
+        self._prepare(n_poses)
         while self.bound <= n_poses and not self._budget.exhausted:
             proposal = self._proposed()
             if proposal is None:
@@ -89,6 +96,12 @@ class MultiplierSearch:
                 break
             self._take(leaves)
         return self.bound > n_poses
+
+    def _prepare(self, n_poses: int) -> None:
+        self._program.set_count(n_poses)
+        if self._spread and self.bound <= n_poses:
+            self._take(self._leaves_about())
+            self._spread = False
 
     def _take(self, leaves: NDArray[np.int64]) -> None:
         self._poses.append(self._store.rows[leaves])
@@ -152,9 +165,7 @@ class MultiplierSearch:
             cells = np.concatenate([cells[~split], *below])
         return cells[~store.may_split(cells)]
 
-    def _record(
-        self, multipliers: NDArray[np.int64], costs: NDArray[np.int64]
-    ) -> None:
+    def _record(self, multipliers: NDArray[np.int64], costs: NDArray[np.int64]) -> None:
         """Keep multipliers, by which the frontier costs so much, if they are better."""
         largest = int(costs.max(initial=0))
         need = self._whole.least_cost(multipliers)
