@@ -14,7 +14,6 @@ e = |P - C| + h, at a distance of at least r::
 """
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,8 +38,6 @@ class DirectionTree:
 
     levels: tuple[NDArray[np.uint64], ...]
     n_rows: int
-    # All rows are there before the search.
-    units: ClassVar[float] = 0.0
 
     @classmethod
     def over(cls, leaves: NDArray[np.uint64], n_rows: int) -> "DirectionTree":
@@ -50,6 +47,11 @@ class DirectionTree:
             n = round((len(levels[-1]) // FACES) ** 0.5)
             levels.append(CubeMap(n).halved(levels[-1]))
         return cls(tuple(levels[::-1]), n_rows)
+
+    @property
+    def units(self) -> float:
+        """Counted work of making cells: all rows are there before the search."""
+        return 0.0
 
     def roots(self) -> CellBatch:
         """Return the six faces."""
