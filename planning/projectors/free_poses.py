@@ -116,7 +116,7 @@ class _Moves:
     def _better(self, poses: CandidateSet, i: int, scale: float) -> CandidateSet:
         """Return the poses with one of them where it leaves least to be lit.
 
-        Around where it is, or where any known pose is.
+        Around where it is, or where one of the best known poses is.
         """
         scene, samples, known = poses.scene, poses.samples, self.candidates
         around = self.source.around(

@@ -105,9 +105,10 @@ class PositionTree(GrownTree):
     ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         cells = ShellCells(*columns)
         facing = self.facing(cells)
-        sure = sure & self._admissible(cells, facing)[:, None]
+        admissible = self._admissible(cells, facing)[:, None]
+        sure = sure & admissible
         covered = sure.copy()
-        at, samples = np.nonzero(may & ~sure & self._admissible(cells, facing)[:, None])
+        at, samples = np.nonzero(may & ~sure & admissible)
         for pairs in parts(at.size, PAIRS):
             cell, sample = at[pairs], samples[pairs]
             seen = self.seen_from(cells, facing, cell, sample)
