@@ -68,7 +68,7 @@ class MultiplierSearch:
         self._whole, self._store, self._budget = whole, store, budget
         self._program = MultiplierProgram(whole, budget)
         self._poses = GrowingArray(store.rows[:0] if known is None else known)
-        self._spread = known is None
+        self._spread, self._taken = known is None, np.empty(0, dtype=np.int64)
         self.multipliers, self.largest_cost = np.zeros_like(whole.weights), 0
         self.ratio, self.bound = Fraction(0), 0.0
         start = whole.multipliers(whole.weights / np.maximum(whole.needs, 1))
@@ -92,6 +92,8 @@ class MultiplierSearch:
             if proposal is None:
                 break
             leaves = self._drilled(n_poses, proposal.multipliers)
+            # What is in hand already would change nothing.
+            leaves = np.setdiff1d(leaves, self._taken)
             if proposal.reached or not leaves.size:
                 break
             self._take(leaves)
@@ -104,6 +106,7 @@ class MultiplierSearch:
             self._spread = False
 
     def _take(self, leaves: NDArray[np.int64]) -> None:
+        self._taken = np.concatenate([self._taken, leaves])
         self._poses.append(self._store.rows[leaves])
 
     def _proposed(self) -> _Proposed | None:
