@@ -357,7 +357,8 @@ def tree_of(
     scene: Scene, template: PlannedProjector, rows: Target, finest: int
 ) -> Tree | None:
     """Return the planner's cells with shadows; None where it would leave them out."""
-    effort = Effort(finest=finest, budget=1.0, shadows=np.inf)
+    # As the planner's, cells of positions go on where the maps of shadows end.
+    effort = Effort(finest=finest + 2, maps=finest, budget=1.0, shadows=np.inf)
     question = BoundQuestion(len(rows), 2, len(rows), rows.samples.weight)
     bound = bound_projectors(scene, (template,), rows, question, effort)
     tree = bound.found.tree
@@ -372,8 +373,8 @@ def main() -> int:
         f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
         f"cores, python {platform.python_version()}, numpy {np.__version__}, trimesh "
         f"{trimesh.__version__}\n\n"
-        f"{given.rows} samples a mesh, cells down to {1 << given.finest} an edge of "
-        f"the cube, seed {given.seed}\n\n"
+        f"{given.rows} samples a mesh, maps of {1 << given.finest} cells an edge of "
+        f"the cube, cells of positions four times as fine, seed {given.seed}\n\n"
         "| mesh | faces | light | rig | poses | lit pairs | suspects | violations | "
         "levels | seconds |\n|---|---|---|---|---|---|---|---|---|---|",
         flush=True,
@@ -414,7 +415,9 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--light", nargs="+", default=LIGHTS, choices=LIGHTS)
     parser.add_argument("--rig-fit", nargs="+", default=FITS[:1], choices=FITS)
     parser.add_argument("--rows", type=int, default=512, help="samples of the target")
-    parser.add_argument("--finest", type=int, default=6, help="2^finest cells an edge")
+    parser.add_argument(
+        "--finest", type=int, default=6, help="maps of 2^finest an edge"
+    )
     parser.add_argument("--seed", type=int, default=0)
     return parser.parse_args()
 

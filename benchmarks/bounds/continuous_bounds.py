@@ -2,14 +2,14 @@
 
 Usage: python -m benchmarks.bounds.continuous_bounds [NAME ...] [--lights parallel
     diverging]
-       [--shares 0.9 0.95] [--tangents 0 40] [--prove] [--more N]
+       [--shares 0.9 0.95] [--tangents 0 40] [--efforts default prove] [--more N]
 
 For the sample and the twelve meshes in `../shared/data/meshes` (those named, if any):
 `count / bound over candidates / bound over all poses` for each light, required share
 and tangent limit, on the 2,000 samples that the planner starts from; what the search
-over cells proved it by, and the seconds of maps and search together. With `--more N`
-the count that N times as many candidates need stands beside it, and no bound over all
-poses. `*`: shadows were left out. A bound in bold equals the count.
+over cells proved it by, and the CPU seconds of maps and searches together. With
+`--more N` the count that N times as many candidates need stands beside it, and no bound
+over all poses. `*`: shadows were left out. A bound in bold equals the count.
 """
 
 import argparse
@@ -32,6 +32,7 @@ from planning.model.errors import InfeasibleLimitsError
 from planning.model.progress import Stopwatch
 from planning.projectors.projector_stage import ProjectorStage, plan_projectors
 from planning.projectors.proved_projectors import prove_fewest
+from planning.proofs.all_poses import Effort
 from planning.proofs.projector_bound import DEFAULT, PROVE
 from planning.report.partial_plan import PlanRequest, Prepared
 from planning.rig.wishes import Wishes
@@ -39,6 +40,7 @@ from planning.steps.prepare import prepared
 
 ROOT = Path(__file__).resolve().parents[2]
 MANY = 200
+EFFORTS = {"default": DEFAULT, "prove": PROVE}
 
 
 def main() -> int:
@@ -46,28 +48,32 @@ def main() -> int:
     given = _arguments()
     print(
         f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores, python {platform.python_version()}, numpy {np.__version__}\n\n"
-        f"{'--prove' if given.prove else 'default'} effort\n"
+        f"cores, python {platform.python_version()}, numpy {np.__version__}\n"
     )
     cases = [(a, b) for b in given.tangents for a in given.shares]
-    heads = [f"{100 * share:g} %, tangent {tangent:g}°" for share, tangent in cases]
+    efforts = given.efforts if given.more == 1 else [f"{given.more} times the poses"]
+    heads = [
+        f"{100 * share:g} %, tangent {tangent:g}°, {effort}"
+        for share, tangent in cases
+        for effort in efforts
+    ]
     print(
-        f"| mesh | faces | light | {' | '.join(heads)} |\n|{(3 + len(cases)) * '---|'}"
+        f"| mesh | faces | light | {' | '.join(heads)} |\n|{(3 + len(heads)) * '---|'}"
     )
     below: dict[tuple[str, str], Counter[int]] = {}
     for path, options, up in jobs(given.names):
         mesh, _ = cut_for_curvature(load_mesh(path, **options))
         for light in given.lights:
-            cells = []
-            for (share, tangent), head in zip(cases, heads, strict=True):
+            cells: list[tuple[str, int]] = []
+            for share, tangent in cases:
                 ready = ready_for(mesh, light, up, share, tangent)
                 if given.more > 1:
-                    cell, gap = _with_more(ready, given.more)
+                    cells.append(_with_more(ready, given.more))
                 else:
-                    cell, gap = _cell(ready, prove=given.prove)
-                cells.append(cell)
+                    cells += _cells(ready, given.efforts)
+            for head, (_, gap) in zip(heads, cells, strict=True):
                 below.setdefault((light, head), Counter())[gap] += 1
-            row = " | ".join(cells)
+            row = " | ".join(cell for cell, _ in cells)
             print(
                 f"| {path.name} | {len(mesh.faces):,} | {light} | {row} |", flush=True
             )
@@ -88,7 +94,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--lights", nargs="+", default=lights, choices=lights)
     parser.add_argument("--shares", nargs="+", type=float, default=(0.9, 0.95))
     parser.add_argument("--tangents", nargs="+", type=float, default=(0.0, 40.0))
-    parser.add_argument("--prove", action="store_true")
+    parser.add_argument("--efforts", nargs="+", default=["default"], choices=EFFORTS)
     parser.add_argument("--more", type=int, default=1, help="times the candidates")
     return parser.parse_args()
 
@@ -163,21 +169,20 @@ def _with_more(ready: Prepared, times: int) -> tuple[str, int]:
     return told, needed[0].count - needed[1].count
 
 
-def _cell(ready: Prepared, *, prove: bool) -> tuple[str, int]:
-    """Return the table's cell, and by how many the bound is below the count."""
+def _cells(ready: Prepared, efforts: list[str]) -> list[tuple[str, int]]:
+    """Return the table's cells, and by how many each bound is below its count."""
     stage = _stage(ready)
     if stage is None:
-        return "nothing lit", 0
+        return [("nothing lit", 0)] * len(efforts)
+    return [_cell(ready, stage, EFFORTS[effort]) for effort in efforts]
+
+
+def _cell(ready: Prepared, stage: ProjectorStage, effort: Effort) -> tuple[str, int]:
     before = stage.certificate.needed.count
-    begin = time.perf_counter()
-    stage = prove_fewest(
-        ready.scene,
-        stage,
-        ready.templates,
-        PROVE if prove else DEFAULT,
-    )
-    seconds = time.perf_counter() - begin
-    needed, bound = stage.certificate.needed, stage.certificate.continuous
+    begin = time.process_time()
+    proved = prove_fewest(ready.scene, stage, ready.templates, effort)
+    seconds = time.process_time() - begin
+    needed, bound = proved.certificate.needed, proved.certificate.continuous
     assert bound is not None
     count, least = needed.count, bound.lower_bound
     shown = f"**{least}**" if least == count else f"{least}"

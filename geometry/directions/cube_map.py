@@ -90,16 +90,7 @@ class CubeMap:
         _, j, i = np.unravel_index(np.arange(self.size), (FACES, n, n))
         inner = (i > 0) & (i < n - 1) & (j > 0) & (j < n - 1)
         border = np.flatnonzero(~inner)
-        reach = self.radii[border] + self.radii.max() + self.clearance
-        chords = 2.0 * np.sin(0.5 * np.minimum(reach, np.pi)) + _ROUNDING
-        near = KDTree(self.centres).query_ball_point(self.centres[border], chords)
-        kept = [
-            np.array(cells)[
-                angle_between(self.centres[cells], self.centres[cell])
-                <= self.radii[cells] + self.radii[cell] + self.clearance + _ROUNDING
-            ]
-            for cell, cells in zip(border, near, strict=True)
-        ]
+        kept = self._within(self.centres[border], self.radii[border] + self.clearance)
         width = max(9, *(cells.size for cells in kept))
         around = np.repeat(np.arange(self.size)[:, None], width, axis=1)
         for row, cells in zip(border, kept, strict=True):
@@ -108,6 +99,55 @@ class CubeMap:
         for column, (b, a) in enumerate(steps):
             around[inner, column] += b * n + a
         return around
+
+    @property
+    def corner_clearance(self) -> float:
+        """Angle within which no direction leaves `around_corners` of its corner.
+
+        Like `clearance`, of lines half a step apart.
+        """
+        return (
+            float(np.arcsin(np.sin(0.25 * np.pi / self.n) * np.sqrt(0.5))) - _ROUNDING
+        )
+
+    @cached_property
+    def around_corners(self) -> Ints:
+        """Cells around each corner, shape (6 (n + 1)^2, k); may repeat.
+
+        On a face the four that meet there. At its border, all whose circles about them
+        come within `corner_clearance` of what is nearer to the corner than to others.
+        """
+        n = self.n
+        _, j, i = np.unravel_index(
+            np.arange(FACES * (n + 1) ** 2), (FACES, n + 1, n + 1)
+        )
+        inner = (i > 0) & (i < n) & (j > 0) & (j < n)
+        border = np.flatnonzero(~inner)
+        # What is nearest to it lies in a cell of half the width that it is a corner of.
+        own = 2.0 * float(CubeMap(2 * n).radii.max()) + self.corner_clearance
+        corners = self.corners.reshape(-1, 3)[border]
+        kept = self._within(corners, np.full(border.size, own))
+        face, rest = np.divmod(np.arange(inner.size), (n + 1) ** 2)
+        row, column = np.divmod(rest, n + 1)
+        first = (face * n + np.maximum(row - 1, 0)) * n + np.maximum(column - 1, 0)
+        around = np.repeat(first[:, None], max(4, *(c.size for c in kept)), axis=1)
+        around[inner, 1:4] += np.array([1, n, n + 1])
+        for row_, cells in zip(border, kept, strict=True):
+            around[row_] = cells[0]
+            around[row_, : cells.size] = cells
+        return around
+
+    def _within(self, directions: Array, reach: Array) -> list[Ints]:
+        """Return the cells whose circles come within an angle of each direction."""
+        chords = 2.0 * np.sin(0.5 * np.minimum(reach + self.radii.max(), np.pi))
+        near = KDTree(self.centres).query_ball_point(directions, chords + _ROUNDING)
+        return [
+            np.array(cells)[
+                angle_between(self.centres[cells], direction)
+                <= self.radii[cells] + own + _ROUNDING
+            ]
+            for cells, direction, own in zip(near, directions, reach, strict=True)
+        ]
 
     def locate(self, directions: Array) -> Ints:
         """Return the cell that each direction lies in, shape (m,)."""
@@ -149,6 +189,16 @@ def located(directions: Array, n: Ints | int) -> Ints:
     length = np.abs(along)
     i, j = _steps(across / length, n), _steps(upwards / length, n)
     return (face * n + j) * n + i
+
+
+def nearest_corner(directions: Array, n: Ints | int) -> Ints:
+    """Return the corner nearest in steps, of a map of n cells an edge, (m,).
+
+    Corner (row j, column i) of face k is (k (n + 1) + j) (n + 1) + i.
+    """
+    face, rest = np.divmod(located(directions, 2 * n), 4 * n * n)
+    j, i = np.divmod(rest, 2 * n)
+    return (face * (n + 1) + (j + 1) // 2) * (n + 1) + (i + 1) // 2
 
 
 def _steps(gnomonic: Array, n: Ints | int) -> Ints:

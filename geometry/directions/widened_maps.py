@@ -2,14 +2,15 @@
 
 A cell of a widened map is set where the cell or one around it is; after k rounds it
 answers for all directions within k times the map's clearance. Coarser maps, widened
-likewise, answer for larger angles.
+likewise, answer for larger angles. For half the clearance the four cells suffice that
+meet in the corner nearest to a direction.
 """
 
 import numpy as np
 
 from geometry.arrays import Array, Ints, Mask, Words
 
-from .cube_map import CubeMap, located
+from .cube_map import CubeMap, located, nearest_corner
 
 # Rounds of widening: the finest map, then the others.
 _FINEST = (1, 2, 3)
@@ -24,9 +25,9 @@ class WidenedMaps:
     """
 
     def __init__(self, rows: Words, cube: CubeMap) -> None:
-        made: list[Words] = []
-        angles: list[float] = []
-        cells: list[int] = []
+        made: list[Words] = [_joined(rows, cube.around_corners)]
+        angles: list[float] = [cube.corner_clearance]
+        cells: list[int] = [cube.n]
         rounds = _FINEST
         while True:
             wide = rows
@@ -55,7 +56,10 @@ class WidenedMaps:
         # Beyond the widest map's angle anything may be open.
         some = np.flatnonzero(level < self._angles.size)
         level, sample = level[some], samples[some]
-        cell = located(directions.take(some, axis=0), self._cells[level])
+        towards = directions.take(some, axis=0)
+        cell = located(towards, self._cells[level])
+        corner = np.flatnonzero(level == 0)
+        cell[corner] = nearest_corner(towards[corner], int(self._cells[0]))
         byte = (self._first[level] + cell) * self._rows.shape[1] + sample // 8
         bits = self._rows.ravel().take(byte) >> (7 - sample % 8).astype(np.uint8)
         answer[some] = (bits & 1).view(np.bool_)
@@ -63,7 +67,12 @@ class WidenedMaps:
 
 
 def _widened(rows: Words, cube: CubeMap) -> Words:
-    wide = rows.copy()
-    for column in cube.neighbours.T:
+    return _joined(rows, cube.neighbours)
+
+
+def _joined(rows: Words, of: Ints) -> Words:
+    """Return the union of the rows of cells (m, k), one of each m."""
+    wide = rows[of[:, 0]]
+    for column in of.T[1:]:
         np.bitwise_or(wide, rows[column], out=wide)
     return wide

@@ -82,5 +82,6 @@ def bound_stage(
         RegionFloors.of(scene, samples.target, "camera").take(np.arange(n)),
     )
     lit = taken(samples, wanted, samples.lit)
-    bound = bound_cameras(scene, devices, lit, question, effort)
+    known = measured[wanted].T
+    bound = bound_cameras(scene, devices, lit, question, effort, known)
     return replace(stage, certificate=joined(proof, bound.proof()))

@@ -147,7 +147,7 @@ def _most_lit(
         lit = np.any(poses.lit[:, chosen], axis=1)
         quotas = Quotas.of(regions, reached | lit, share)
         counts = regions.counts(lit)
-        return float(_missed(quotas, counts[:, None])[0]), -int(counts.sum())
+        return float(missed_shares(quotas, counts[:, None])[0]), -int(counts.sum())
 
     best = min(found, key=missing)
     lit = np.any(poses.lit[:, best], axis=1)
@@ -156,7 +156,7 @@ def _most_lit(
     return best, missing(best)[0], bool(spared) or not regions.share
 
 
-def _missed(quotas: Quotas, counts: NDArray[np.int64]) -> NDArray[np.float64]:
+def missed_shares(quotas: Quotas, counts: NDArray[np.int64]) -> NDArray[np.float64]:
     """Return the shares of quotas that are missed, added up, (k,).
 
     Of counts of each number of `RegionFloors`, (n_rows, k). Poses that move by an angle
@@ -185,7 +185,7 @@ def _swapped(
             lit = np.any(poses.lit[:, rest], axis=1)
             counts = of_number[:, ~lit] @ poses.lit[~lit].astype(np.float32)
             counts = counts.astype(np.int64) + quotas.regions.counts(lit)[:, None]
-            missed, total = _missed(quotas, counts), counts.sum(axis=0)
+            missed, total = missed_shares(quotas, counts), counts.sum(axis=0)
             if poses.stock is not None:
                 missed[poses.stock.left(rest)[poses.stock.kinds] <= 0] = np.inf
             into = int(np.lexsort((-total, missed))[0])

@@ -24,6 +24,7 @@ from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
 from .candidate_set import CandidateSource
+from .free_poses import free_poses
 from .projector_stage import ProjectorStage
 
 
@@ -43,13 +44,28 @@ def prove_fewest(
     source = CandidateSource(scene, templates)
     while stage.certificate.needed.count > stage.certificate.given:
         bound = bound_of(scene, stage, templates, effort)
-        offered = source.towards(bound.directions) if joining else ()
-        better = _with_more(stage, offered) if offered else stage
+        better = _better(source, stage, bound, effort) if joining else stage
         if better is stage:
             return replace(stage, certificate=joined(stage.certificate, bound.proof()))
         stage = better
     n_reached = int(stage.candidates.reached.sum())
     return replace(stage, certificate=with_existing_alone(stage.certificate, n_reached))
+
+
+def _better(
+    source: CandidateSource,
+    stage: ProjectorStage,
+    bound: ContinuousBound,
+    effort: Effort,
+) -> ProjectorStage:
+    """Return the stage with fewer projectors, if poses are found between the bounds."""
+    offered = source.towards(bound.directions)
+    better = _with_more(stage, offered) if offered else stage
+    count = stage.certificate.needed.count
+    if better is not stage or bound.proof().lower_bound >= count:
+        return better
+    found = free_poses(source, stage.candidates, count - 1, effort.starts)
+    return _with_more(stage, found) if found else stage
 
 
 def _with_more(
@@ -90,8 +106,15 @@ def bound_of(
         samples.samples.weight * len(samples),
         RegionFloors.of(scene, samples.take(np.arange(n))),
     )
-    wanted = samples.take(np.flatnonzero(reached & ~free))
-    return bound_projectors(scene, templates, wanted, question, effort)
+    wanted = np.flatnonzero(reached & ~free)
+    return bound_projectors(
+        scene,
+        templates,
+        samples.take(wanted),
+        question,
+        effort,
+        stage.candidates.lit[wanted].T,
+    )
 
 
 def _lit_by_existing(

@@ -20,20 +20,25 @@ _STATUS: dict[CellStatus, Literal["proved", "survived", "cut"]] = {
     CellStatus.CUT: "cut",
 }
 
+# Share of the work for a search that leaves floors of regions out, where there are any.
+_WITHOUT_FLOORS = 0.8
+
 
 @dataclass(frozen=True)
 class Effort:
     """What is spent on a bound.
 
     Attributes:
-        finest: Cells are parts of a cube map of 2^finest cells an edge. Cameras' are,
-            where rougher ones without shadows leave room.
+        finest: Cells of positions are parts of a cube map of 2^finest cells an edge;
+            cameras' where rougher ones without shadows leave room.
         budget: Counted work of a search.
         shadows: Pairs of sample and face above which shadows are left out.
         most_samples: Samples of the cover at most; None: all that it has.
         offers: Poses offered, beside cells that can't be refuted, where the bound
             leaves room for fewer projectors.
-        maps: As `finest`, of the maps in which cameras' shadows are drawn.
+        maps: As `finest`, of the maps in which shadows are drawn; in parallel light
+            their cells are those that are searched.
+        starts: Searches for projectors between the bound and the count.
         aims: As `finest`, of the aims of cameras whose image the object overflows;
             None: cells aren't cut by aim.
     """
@@ -45,6 +50,7 @@ class Effort:
     offers: int = 0
     maps: int = 0
     aims: int | None = None
+    starts: int = 0
 
 
 @dataclass(frozen=True)
@@ -103,14 +109,18 @@ class BoundQuestion:
             regions.row[reached & ~free],
         )
 
-    def searched(self, tree: CellTree, budget: float) -> CellBound:
+    def searched(
+        self, tree: CellTree, budget: float, known: NDArray[np.bool_] | None = None
+    ) -> CellBound:
         """Return what a search over cells of poses proves.
 
         What is required of all alone comes first: what it proves holds with floors.
+        What some poses cover of the tree's samples, (k, n_rows), guides the search.
         """
         required = np.array([float(self.required)])
         problem = CellProblem(np.ones(tree.n_rows), required)
-        bound = bound_count(problem, tree, self.count, budget=budget)
+        first = budget * (_WITHOUT_FLOORS if any(self.floors) else 1.0)
+        bound = bound_count(problem, tree, self.count, known=known, budget=first)
         if bound.status is CellStatus.PROVED or not any(self.floors):
             return bound
         floored = CellProblem(
@@ -120,7 +130,14 @@ class BoundQuestion:
             self.regions,  # pyright: ignore[reportArgumentType]
             float(self.required),
         )
-        again = bound_count(floored, tree, self.count, budget=budget)
+        again = bound_count(
+            floored,
+            tree,
+            self.count,
+            known=known,
+            least=int(bound.lower_bound),
+            budget=budget - first,
+        )
         return again if again.lower_bound > bound.lower_bound else bound
 
 

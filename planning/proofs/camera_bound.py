@@ -16,6 +16,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
 from geometry.directions.cube_map import CubeMap
@@ -38,11 +39,11 @@ from .all_poses import BoundQuestion, ContinuousBound, Effort
 # Levels by which cells without shadows are rougher than those among them.
 _ROUGHER = 2
 DEFAULT = Effort(
-    finest=8, aims=None, maps=5, budget=1.5e9, shadows=3e8, most_samples=2000
+    finest=8, aims=None, maps=5, budget=2.5e9, shadows=3e8, most_samples=2000
 )
 # Of what is asked only to spare a search: rough cells, no shadows.
 ROUGH = replace(DEFAULT, shadows=0.0, budget=3e8)
-PROVE = Effort(finest=9, aims=5, maps=7, budget=1e10, shadows=np.inf)
+PROVE = Effort(finest=9, aims=5, maps=7, budget=3e10, shadows=np.inf)
 
 
 def bound_cameras(
@@ -51,21 +52,23 @@ def bound_cameras(
     samples: LitSamples,
     question: BoundQuestion,
     effort: Effort,
+    known: NDArray[np.bool_] | None = None,
 ) -> ContinuousBound:
     """Bound the cameras over every pose of the workspace, for given projectors.
 
-    The samples are those that some candidate measures and no existing camera does.
+    The samples are those that some candidate measures and no existing camera does;
+    which of them each candidate measures, (k, n), guides the search.
     """
     if question.count <= 1:
         # What is required takes one, with shadows or without: no cell is looked at.
         effort = replace(effort, finest=0, aims=None, shadows=0.0)
     trees = camera_trees(scene, devices, samples, effort)
     tree, shadows = next(trees)
-    best = question.searched(tree, effort.budget)
+    best = question.searched(tree, effort.budget, known)
     # The next tree is asked for only where it is needed: shadows cost most.
     while best.status is not CellStatus.PROVED and (finer := next(trees, None)):
         tree, among_shadows = finer
-        better = question.searched(tree, effort.budget)
+        better = question.searched(tree, effort.budget, known)
         # Cut short, a finer search may have proved less.
         if better.lower_bound >= best.lower_bound:
             best, shadows = better, among_shadows

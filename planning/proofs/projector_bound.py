@@ -24,6 +24,7 @@ from planning.proofs.cells.direction_cells import (
     mesh_reach,
     open_samples,
 )
+from planning.proofs.cells.lit_cells import LitCells
 from planning.proofs.cells.position_cells import PositionTree
 from planning.scene.lights import light_of
 from planning.scene.samples import Target
@@ -34,8 +35,10 @@ from solvers.cells.cell_bound import CellBound, CellStatus
 
 from .all_poses import BoundQuestion, ContinuousBound, Effort
 
-DEFAULT = Effort(finest=6, budget=1.5e9, shadows=3e8, most_samples=2000)
-PROVE = Effort(finest=7, budget=6e10, shadows=np.inf, offers=150)
+DEFAULT = Effort(
+    finest=8, maps=6, budget=3.5e9, shadows=3e8, most_samples=2000, starts=1
+)
+PROVE = Effort(finest=9, maps=7, budget=4e10, shadows=np.inf, offers=150, starts=4)
 
 
 def bound_projectors(
@@ -44,20 +47,22 @@ def bound_projectors(
     samples: Target,
     question: BoundQuestion,
     effort: Effort,
+    known: NDArray[np.bool_] | None = None,
 ) -> ContinuousBound:
     """Bound the projectors over every pose of the workspace.
 
     Field of view, beam and rings are left out: the bound holds for any of them. Of
     several models it is of the range that any has, and of any number of each.
 
-    The samples are those that some candidate lights and no existing projector does.
+    The samples are those that some candidate lights and no existing projector does;
+    which of them each candidate lights, (k, n), guides the search.
     """
     reach = mesh_reach(scene)
     if question.count <= 1:
         # What is required takes one, with shadows or without: no cell is looked at.
-        effort = replace(effort, finest=0, shadows=0.0)
+        effort = replace(effort, finest=0, maps=0, shadows=0.0)
     shadows = bool(len(samples) * len(scene.mesh.faces) <= effort.shadows)
-    cube, required = CubeMap(1 << effort.finest), scene.requirements.projector
+    required = scene.requirements.projector
     limits = DirectionLimits(required.max_incidence, required.min_tangent_angle)
     workspace = scene.requirements.workspace
     devices = [template.device for template in templates]
@@ -68,6 +73,7 @@ def bound_projectors(
     aside = reach + widest if parallel else 0.0
     depth = float(np.sqrt(max(0.0, near**2 - aside**2)))
     shadows = shadows and bool(depth >= reach)
+    cube = CubeMap(1 << effort.maps)
     opened = open_samples(
         scene, limits, samples, cube, shadows=shadows, nearest_m=depth
     )
@@ -86,8 +92,10 @@ def bound_projectors(
             samples.samples.points,
             WidenedMaps(opened, cube),
             finest=effort.finest,
+            closed=WidenedMaps(~opened, cube),
+            limits=LitCells(samples, required),
         )
-    bound = question.searched(tree, effort.budget)
+    bound = question.searched(tree, effort.budget, known)
     unrefuted = np.empty((0, 3))
     if bound.status in (CellStatus.SURVIVED, CellStatus.CUT):
         unrefuted = _promising(bound, tree, effort.offers)

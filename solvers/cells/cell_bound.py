@@ -22,7 +22,7 @@ from .cell_tree import CellTree
 from .cell_tuples import Enough, refute_tuples
 
 DEFAULT_BUDGET = 2e10
-_MULTIPLIERS_SHARE = 0.5
+_MULTIPLIERS_SHARE = 0.75
 
 
 class CellStatus(enum.Enum):
@@ -74,6 +74,8 @@ def bound_count(
     tree: CellTree,
     count: int,
     *,
+    known: NDArray[np.bool_] | None = None,
+    least: int = 0,
     budget: float = DEFAULT_BUDGET,
     time_limit: float = float("inf"),
 ) -> CellBound:
@@ -83,6 +85,9 @@ def bound_count(
         problem: What must be served.
         tree: Cells that hold every pose of the workspace.
         count: Poses that are known to be enough.
+        known: Which rows some poses of the workspace serve, shape (k, n_rows). They
+            guide the search; what it proves doesn't rest on them.
+        least: Poses that were proved to be needed: no fewer are looked at.
         budget: Counted work, about 1e9 a second.
         time_limit: Wall time that cuts the work, in [s]; the proof then says so.
 
@@ -96,25 +101,39 @@ def bound_count(
             f"the tree's cells have {tree.n_rows} rows, the problem has "
             f"{problem.weights.size}"
         )
-    return _Proof(problem, tree, count, WorkBudget(budget, time_limit=time_limit)).run()
+    limit = WorkBudget(budget, time_limit=time_limit)
+    return _Proof(problem, tree, count, limit, known, least).run()
 
 
 class _Proof:
     def __init__(
-        self, problem: CellProblem, tree: CellTree, count: int, budget: WorkBudget
+        self,
+        problem: CellProblem,
+        tree: CellTree,
+        count: int,
+        budget: WorkBudget,
+        known: NDArray[np.bool_] | None,
+        least: int,
     ) -> None:
         self.problem, self.tree, self.count, self.budget = problem, tree, count, budget
         self.whole = whole_rows(problem)
-        self.store = CellStore(tree, budget)
         share = budget.part(_MULTIPLIERS_SHARE * budget.units)
-        self.search = MultiplierSearch(self.whole, self.store, share)
-        self.lower, self.proof = 0, "nothing is required of poses"
+        # Cells that are made count in both.
+        self.store = CellStore(tree, share)
+        rows = None if known is None else pack_rows(known)
+        self.search = MultiplierSearch(self.whole, self.store, share, rows)
+        self.lower, self.proof = min(least, count), "nothing is required of poses"
+        if least:
+            self.proof = "fewer were refuted before"
         self.survivor: NDArray[np.int64] | None = None
 
     def run(self) -> CellBound:
         if not _reachable(self.whole, self.store):
             proof = "all cells together serve less than is required"
             return self._answer(CellStatus.INFEASIBLE, float("inf"), proof)
+        if self.lower < self.count - 1 and (self.lower or self._refute(0)):
+            # Smaller numbers follow from larger ones.
+            self.search.refute_most(self.count - 1)
         while self.lower < self.count and self._refute(self.lower):
             pass
         if self.lower >= self.count:

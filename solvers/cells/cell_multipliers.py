@@ -1,38 +1,55 @@
-"""Multipliers that refute a number of poses, with cells split where they are used.
+"""Multipliers that refute a number of poses, with cells split where they cost too much.
 
-The frontier is the set of cells that aren't split; it holds every pose. One round
-solves the program over the cells in hand and takes in hand what of the frontier is
-costlier than the program knew. Where nothing is, cells that the fractional cover uses,
-and with them the costliest others, are split: a child's cost is at most its parent's,
-so the bound can only rise.
+The program's rows are poses: those that are known, and cells that can't be split, which
+stand for poses. They are few and lie where they matter, so its multipliers are nearly
+those of all poses. By them, cells of the frontier that cost too much are split, the
+costliest first; the frontier is the set of cells that aren't split, and holds every
+pose. Either none of it costs too much any more, and the number is refuted, or cells do
+that can't be split, and become rows of the program.
 """
 
 from fractions import Fraction
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.bit_rows import unpack_rows
+from solvers.bit_rows import BitSum, GrowingArray, unpack_rows
 from solvers.status import WorkBudget
 
 from .cell_problem import WholeRows
 from .cell_program import MultiplierProgram
 from .cell_store import CellStore
 
-_TAKEN = 40
-_POLISH = 8
-_SPLIT = 100
-# Splitting goes on while it leaves at most this share of what was too costly: errors
-# halve with the size of cells, so that less would never close the gap.
-_WORTH = 0.6
+# Rows taken in hand at a time; cells that can't be split that cost too much, after
+# which others aren't looked at; and cells split at a time.
+_TAKEN = 100
+_ENOUGH = 40
+_SPLIT = 400
+# Where no poses are known: cells below each of which one that can't be split is taken.
+_SPREAD = 100
 _TOLERANCE = 1e-6
-# Rounds of splits after which a descent that hardly moves is given up, and its pace.
-_LOOK_BACK = 4
-_PATIENCE = 4.0
+
+
+class _Proposed(NamedTuple):
+    """Multipliers, and whether the poses in hand may be enough.
+
+    Then no multipliers refute their number, though good ones help whoever looks on.
+    """
+
+    multipliers: NDArray[np.int64]
+    reached: bool
 
 
 class MultiplierSearch:
     """Raises the bound; holds the best multipliers so far.
+
+    Args:
+        whole: What must be served.
+        store: Cells that hold every pose.
+        budget: Of the search.
+        known: Bit rows of some poses, shape (k, n_words). They guide the search, and
+            nothing that is proved rests on them. None: none are known.
 
     Attributes:
         multipliers: The best, integers, shape (n_rows,).
@@ -41,116 +58,122 @@ class MultiplierSearch:
         bound: The same, rounded up; inf if no number of poses is enough.
     """
 
-    def __init__(self, whole: WholeRows, store: CellStore, budget: WorkBudget) -> None:
+    def __init__(
+        self,
+        whole: WholeRows,
+        store: CellStore,
+        budget: WorkBudget,
+        known: NDArray[np.uint64] | None = None,
+    ) -> None:
         self._whole, self._store, self._budget = whole, store, budget
         self._program = MultiplierProgram(whole, budget)
+        self._poses = GrowingArray(store.rows[:0] if known is None else known)
+        self._spread, self._taken = known is None, np.empty(0, dtype=np.int64)
         self.multipliers, self.largest_cost = np.zeros_like(whole.weights), 0
-        self.ratio, self.bound, self._need = Fraction(0), 0.0, Fraction(0)
-        self._drilled = self.multipliers
-        start = whole.weights / np.maximum(whole.needs, 1)
-        self._record(start, store.frontier)
+        self.ratio, self.bound = Fraction(0), 0.0
+        start = whole.multipliers(whole.weights / np.maximum(whole.needs, 1))
+        self._record(start, store.costs(store.frontier, start))
+
+    def refute_most(self, n_poses: int) -> None:
+        """Refute at once so many poses, or as many as poses in hand leave room for."""
+        while self.bound <= n_poses:
+            self._prepare(n_poses)
+            proposal = self._proposed()
+            if proposal is None or not proposal.reached:
+                break
+            n_poses -= 1
+        self.refute(n_poses)
 
     def refute(self, n_poses: int) -> bool:
         """Look for multipliers by which so many poses aren't enough."""
-        self._program.set_count(n_poses)
-        ratios: list[float] = []
+        self._prepare(n_poses)
         while self.bound <= n_poses and not self._budget.exhausted:
-            self._drill(n_poses)
-            if self.bound > n_poses:
+            proposal = self._proposed()
+            if proposal is None:
                 break
-            moved = self._descend(n_poses)
-            ratios.append(float(self.ratio))
-            if not moved or _stalls(ratios, n_poses):
+            leaves = self._drilled(n_poses, proposal.multipliers)
+            # What is in hand already would change nothing.
+            leaves = np.setdiff1d(leaves, self._taken)
+            if proposal.reached or not leaves.size:
                 break
+            self._take(leaves)
         return self.bound > n_poses
 
-    def _drill(self, n_poses: int) -> None:
-        if self.multipliers is self._drilled:
-            return
-        allowed = float(self._need) / n_poses
-        gap = self.largest_cost - allowed
-        while self.bound <= n_poses and not self._budget.exhausted:
-            frontier = self._store.frontier
-            costs = self._store.costs(frontier, self.multipliers)
-            split = self._split(frontier[costs >= allowed + 0.5 * gap])
-            frontier = self._store.frontier
-            costs = self._store.costs(frontier, self.multipliers)
-            self._measure(int(costs.max(initial=0)))
-            before, gap = gap, self.largest_cost - allowed
-            if not split or gap >= _WORTH * before:
-                self._drilled = self.multipliers
-                break
+    def _prepare(self, n_poses: int) -> None:
+        self._program.set_count(n_poses)
+        if self._spread and self.bound <= n_poses:
+            self._take(self._leaves_about())
+            self._spread = False
 
-    def _descend(self, n_poses: int) -> bool:
-        """Solve the program over the frontier, then split what it uses.
+    def _take(self, leaves: NDArray[np.int64]) -> None:
+        self._taken = np.concatenate([self._taken, leaves])
+        self._poses.append(self._store.rows[leaves])
 
-        Cells in hand bound the program from below. As soon as they alone reach the
-        requirement, the frontier refutes nothing; where none of those used can be
-        split, no multipliers do, and a few more rounds only improve ``most``.
-        """
-        polish = _POLISH
-        while polish and not self._budget.exhausted:
-            proposal = self._program.solve()
-            if proposal is None:
-                return False
-            frontier = self._store.frontier
-            costs = self._record(proposal.multipliers, frontier)
-            if self.bound > n_poses:
-                return True
-            reached = proposal.value > _TOLERANCE * self._whole.weights.size
-            final = reached and not np.any(self._store.may_split(proposal.used))
-            polish -= final
-            if final or not reached:
-                if self._take(frontier, costs):
-                    continue
-                if final:
-                    return False
-            costly = frontier[np.argsort(-costs, kind="stable")[:_SPLIT]]
-            return self._split(np.union1d(proposal.used, costly))
-        return False
+    def _proposed(self) -> _Proposed | None:
+        """Return the multipliers of all poses; None if the work ended."""
+        while (proposal := self._program.solve()) is not None:
+            reached = proposal.value > -_TOLERANCE * self._whole.weights.size
+            multipliers = self._whole.multipliers(proposal.multipliers)
+            costs = BitSum(multipliers)(self._poses.values)
+            in_hand = np.zeros(costs.size, dtype=bool)
+            in_hand[self._program.poses] = True
+            most = int(costs[in_hand].max(initial=0))
+            costs[in_hand] = 0
+            dearest = np.argsort(-costs, kind="stable")[:_TAKEN]
+            dearest = dearest[costs[dearest] > most * (1.0 + _TOLERANCE)]
+            if reached or not dearest.size:
+                return _Proposed(multipliers, reached)
+            rows = unpack_rows(self._poses.values[dearest], self._whole.weights.size)
+            self._program.add(dearest, rows)
+        return None
 
-    def _record(
-        self, proposed: NDArray[np.float64], frontier: NDArray[np.int64]
+    def _drilled(
+        self, n_poses: int, multipliers: NDArray[np.int64]
     ) -> NDArray[np.int64]:
-        """Keep multipliers if they are the best; return the costs."""
-        multipliers = self._whole.multipliers(proposed)
-        costs = self._store.costs(frontier, multipliers)
+        """Split what costs too much; return cells that do and can't be split."""
+        store = self._store
+        # Poses that cost less than this each aren't enough together.
+        least = -(-self._whole.least_cost(multipliers) // n_poses)
+        cells = store.frontier
+        costs = store.costs(cells, multipliers)
+        while True:
+            over = costs >= least
+            splits = over & store.may_split(cells)
+            leaves = cells[over & ~splits]
+            ended = self._budget.exhausted or store.full
+            if ended or leaves.size >= _ENOUGH or not splits.any():
+                break
+            places = np.flatnonzero(splits)
+            places = places[np.argsort(-costs[places], kind="stable")[:_SPLIT]]
+            new = store.split(cells[places])
+            kept = np.ones(cells.size, dtype=bool)
+            kept[places] = ~store.is_split(cells[places])
+            cells = np.concatenate([cells[kept], new])
+            costs = np.concatenate([costs[kept], store.costs(new, multipliers)])
+        self._record(multipliers, costs)
+        return leaves
+
+    def _leaves_about(self) -> NDArray[np.int64]:
+        """Return cells that can't be split, spread over the tree."""
+        store = self._store
+        while not store.full:
+            spread = store.frontier
+            splits = spread[store.may_split(spread)]
+            if spread.size >= _SPREAD or not store.split(splits).size:
+                break
+        cells = store.frontier[:: max(1, store.frontier.size // _SPREAD)]
+        while store.split(cells).size:
+            split = store.is_split(cells)
+            below = [store.children(cell)[:1] for cell in cells[split]]
+            cells = np.concatenate([cells[~split], *below])
+        return cells[~store.may_split(cells)]
+
+    def _record(self, multipliers: NDArray[np.int64], costs: NDArray[np.int64]) -> None:
+        """Keep multipliers, by which the frontier costs so much, if they are better."""
+        largest = int(costs.max(initial=0))
         need = self._whole.least_cost(multipliers)
-        largest_cost = int(costs.max(initial=0))
         self._budget.spend(2e3 * multipliers.size)
-        if need / max(1, largest_cost) > self.ratio:
-            self.multipliers, self._need = multipliers, need
-            self._measure(largest_cost)
-        return costs
-
-    def _measure(self, largest_cost: int) -> None:
-        self.largest_cost = largest_cost
-        self.ratio = self._need / max(1, largest_cost)
-        self.bound = self._whole.count_bound(self.multipliers, largest_cost)
-
-    def _take(self, frontier: NDArray[np.int64], costs: NDArray[np.int64]) -> bool:
-        """Take in hand the costliest cells that break the program, if any does."""
-        in_hand = np.isin(frontier, self._program.cells)
-        known = int(costs[in_hand].max(initial=0))
-        order = np.argsort(-np.where(in_hand, -1, costs), kind="stable")[:_TAKEN]
-        cells = frontier[order[costs[order] > known * (1.0 + _TOLERANCE)]]
-        cells = cells[~np.isin(cells, self._program.cells)]
-        if cells.size == 0:
-            return False
-        rows = unpack_rows(self._store.rows[cells], self._whole.weights.size)
-        self._program.add(cells, rows)
-        return True
-
-    def _split(self, cells: NDArray[np.int64]) -> bool:
-        """Split cells, in hand or not; say if any could."""
-        before = self._store.size
-        self._store.split(cells)
-        self._program.drop(cells[self._store.is_split(cells)])
-        return self._store.size > before
-
-
-def _stalls(ratios: list[float], n_poses: int) -> bool:
-    """Whether the rounds so far move too slowly to refute so many poses."""
-    if len(ratios) <= _LOOK_BACK:
-        return False
-    return n_poses - ratios[-1] > _PATIENCE * (ratios[-1] - ratios[-1 - _LOOK_BACK])
+        if need / max(1, largest) > self.ratio:
+            self.multipliers, self.largest_cost = multipliers, largest
+            self.ratio = need / max(1, largest)
+            self.bound = self._whole.count_bound(multipliers, largest)

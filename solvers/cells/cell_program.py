@@ -3,14 +3,14 @@
 The least upper bound on what K poses serve, over multipliers lambda_i = w_i u_i / r_i::
 
     minimise    K theta + sum_g t_g (w(g) - W_g) - sum_i w_i u_i
-    subject to  sum_{i in S} (w_i / r_i) u_i <= theta   for the cells S in hand
+    subject to  sum_{i in S} (w_i / r_i) u_i <= theta   for the poses S in hand
                 0 <= u_i <= t_g,  sum_g t_g = 1
 
 Where W is required of all rows as well, t <= t_g for all sets adds -t (W - sum_g W_g).
 
-A negative value refutes K: its multipliers satisfy need(lambda) > K M. Rows are cells,
-a few hundred; their dual values are the poses that a fractional cover would use. What
-comes back is a proposal, evaluated again in integers by who uses it.
+A negative value refutes K poses of those in hand: its multipliers satisfy need(lambda)
+> K M. Rows are a few hundred poses. What comes back is a proposal, evaluated again in
+integers by who uses it.
 """
 
 from dataclasses import dataclass
@@ -24,8 +24,8 @@ from solvers.status import WorkBudget
 
 from .cell_problem import WholeRows
 
-# Work of one simplex iteration for each row and cell in hand.
-_UNITS_PER_ENTRY = 0.7
+# Work of one simplex iteration for each row and pose in hand.
+_UNITS_PER_ENTRY = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,17 +34,15 @@ class Proposal:
 
     Attributes:
         multipliers: Shape (n_rows,), at least 0.
-        value: The optimum over the cells in hand.
-        used: Cells in hand that the fractional cover uses.
+        value: The optimum over the poses in hand.
     """
 
     multipliers: NDArray[np.float64]
     value: float
-    used: NDArray[np.int64]
 
 
 class MultiplierProgram:
-    """A program that keeps its basis while cells come and go."""
+    """A program that keeps its basis while poses come."""
 
     def __init__(self, whole: WholeRows, budget: WorkBudget) -> None:
         import highspy
@@ -67,34 +65,25 @@ class MultiplierProgram:
         lacking = whole.needed_total - sum(whole.needed)
         # The price of what is required of all, where that is more than the floors.
         self._of_all = np.full(int(lacking > 0), -lacking * scale)
-        self.cells = np.empty(0, dtype=np.int64)
+        self.poses = np.empty(0, dtype=np.int64)
         self._solver = self._model()
 
     def set_count(self, n_poses: float) -> None:
         """Ask about this number of poses from now on."""
         self._solver.changeColCost(self._live.size, float(n_poses))
 
-    def add(self, cells: NDArray[np.int64], serves: NDArray[np.bool_]) -> None:
-        """Take cells in hand, with their rows as a matrix (n, n_rows)."""
+    def add(self, poses: NDArray[np.int64], serves: NDArray[np.bool_]) -> None:
+        """Take poses in hand, with their rows as a matrix (n, n_rows)."""
         infinity = self._highs.kHighsInf
         for row in serves[:, self._live]:
             places = np.append(np.flatnonzero(row), self._live.size).astype(np.int32)
             values = np.append(self._costs[row], -1.0)
             self._solver.addRow(-infinity, 0.0, places.size, places, values)
-        self.cells = np.concatenate([self.cells, cells])
-
-    def drop(self, cells: NDArray[np.int64]) -> None:
-        """Let cells in hand go, because their children take their place."""
-        gone = np.flatnonzero(np.isin(self.cells, cells))
-        if gone.size:
-            first = self._solver.getNumRow() - self.cells.size
-            places = (first + gone).astype(np.int32)
-            self._solver.deleteRows(places.size, places)
-            self.cells = np.delete(self.cells, gone)
+        self.poses = np.concatenate([self.poses, poses])
 
     def solve(self) -> Proposal | None:
         """Return the program's multipliers, or None if it wasn't solved."""
-        cost = _UNITS_PER_ENTRY * self._live.size * (self.cells.size + 12)
+        cost = _UNITS_PER_ENTRY * self._live.size * (self.poses.size + 12)
         steps = int(min(self._budget.remaining / cost, 1e7))
         if steps < 1 or self._budget.exhausted:
             return None
@@ -107,15 +96,13 @@ class MultiplierProgram:
         self._budget.spend(max(0, int(taken)) * cost + 1e5)
         solution = self._solver.getSolution()
         values = np.asarray(solution.col_value, dtype=np.float64)
-        duals = np.asarray(solution.row_dual, dtype=np.float64)
         n = self._live.size
         if values.size <= n or not np.all(np.isfinite(values)):
             return None
         multipliers = np.zeros(self._whole.weights.size)
         multipliers[self._live] = self._costs * np.clip(values[:n], 0.0, None)
-        used = np.abs(duals[duals.size - self.cells.size :]) > 1e-9
         value = float(self._solver.getInfo().objective_function_value)
-        return Proposal(multipliers, value, self.cells[used])
+        return Proposal(multipliers, value)
 
     def _model(self) -> Any:  # noqa: ANN401
         n, n_sets = self._live.size, self._slack.size

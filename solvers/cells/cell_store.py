@@ -95,7 +95,9 @@ class CellStore:
     def _ask(self, parents: NDArray[np.int64]) -> None:
         if self.full:
             return
+        before = self.tree.units
         batch = self.tree.children(self.names[parents])
+        self._budget.spend(self.tree.units - before)
         if (self.size + batch.cells.size) * self._words * 8 > MAX_BYTES:
             self.full = True
             return

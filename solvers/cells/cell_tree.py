@@ -58,6 +58,11 @@ class CellTree(Protocol):
         """Number of rows, that is of bits that count."""
         ...
 
+    @property
+    def units(self) -> float:
+        """Counted work of making the cells that were handed out so far."""
+        ...
+
     def roots(self) -> CellBatch:
         """Return the cells that hold every pose together."""
         ...

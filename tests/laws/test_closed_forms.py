@@ -27,8 +27,8 @@ from planning.scene.limits.projector_limits import LIT
 from planning.steps.prepare import prepared
 from solvers.poses.cone import max_margin_direction
 
-EFFORT = Effort(finest=5, budget=3e8, shadows=0.0, most_samples=2000)
-SHADOWS = replace(EFFORT, finest=6, shadows=np.inf)
+EFFORT = Effort(finest=5, maps=5, budget=3e8, shadows=0.0, most_samples=2000)
+SHADOWS = replace(EFFORT, finest=6, maps=6, shadows=np.inf)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from support.factories import make_projector, make_requirements, make_scene
 
 from geometry.shapes.primitives import sphere
 from planning.projectors.candidate_set import CandidateSet, CandidateSource
-from planning.projectors.one_fewer import _missed, _swapped, one_fewer
+from planning.projectors.one_fewer import _swapped, missed_shares, one_fewer
 from planning.projectors.share_margin import margin_at_share, widest_between
 from planning.proofs.quotas import Quotas, RegionFloors
 from planning.proofs.selection import select_fewest
@@ -133,7 +133,7 @@ def test_no_other_pose_in_the_place_of_one_misses_less_of_floors_and_all(seed):
             wanted = np.ceil(0.8 * (regions.row == number).sum())
             short.append(max(0, wanted - lit[regions.row == number].sum()) / wanted)
         assert sum(short) == pytest.approx(
-            float(_missed(quotas, regions.counts(lit)[:, None])[0])
+            float(missed_shares(quotas, regions.counts(lit)[:, None])[0])
         )
         return sum(short), -lit.sum()
 

@@ -29,7 +29,7 @@ from planning.steps import stages
 # Two sides of 100 cm2, the others of 20 cm2.
 SIZE = (0.02, 0.1, 0.1)
 BIG = ((1, 0, 0), (-1, 0, 0))
-EFFORT = Effort(finest=4, budget=2e8, shadows=0.0)
+EFFORT = Effort(finest=4, maps=4, budget=2e8, shadows=0.0)
 
 
 @pytest.fixture(autouse=True)

@@ -15,6 +15,7 @@ from planning.model.bodies import Box
 from planning.proofs import projector_bound as continuous
 from planning.proofs.all_poses import BoundQuestion, Effort
 from planning.proofs.cells.direction_cells import DirectionTree
+from planning.proofs.cells.position_cells import PositionTree
 from planning.proofs.projector_bound import DEFAULT, bound_projectors
 from planning.rig.rig import load_rig
 from planning.scene.draws import Draw
@@ -23,7 +24,7 @@ from planning.scene.scene import Scene
 from solvers.bit_rows import pack_rows, unpack_rows
 from solvers.cells.cell_bound import CellStatus
 
-QUICK = Effort(finest=6, budget=1e9, shadows=np.inf)
+QUICK = Effort(finest=6, maps=6, budget=1e9, shadows=np.inf)
 RADII = np.array([0.1, 0.45])
 
 
@@ -351,7 +352,7 @@ def test_devices_inside_the_object_cast_no_shadows_that_are_relied_on():
     """Where the shell cuts the object, something may stand behind the device."""
     mesh = SHAPES["box over a plate"]
     for light in ("parallel", "diverging"):
-        effort = replace(QUICK, finest=4)
+        effort = replace(QUICK, finest=4, maps=4)
         shell = {"projector_radius_m": (0.05, 1.2), "n": 100}
         found = bounded(mesh, light, 0.3, 2, effort, **shell)
         assert not found.shadows
@@ -392,3 +393,29 @@ def test_cells_that_are_left_are_where_the_better_cover_is():
     assert len(more) == 42
     np.testing.assert_allclose(np.linalg.norm(more, axis=1), 1.0)
     assert continuous.PROVE.finest > DEFAULT.finest
+
+
+def test_what_is_sure_of_a_cell_changes_no_row_of_its_parts(monkeypatch):
+    scene, template = stage_for(
+        SHAPES["box over a plate"], "diverging", tangent_deg=40.0
+    )
+    rows = scene.target_samples(Draw(200, 3))
+
+    def cells():
+        effort = replace(QUICK, finest=7, maps=5, budget=1.0)
+        asked = question(200, 3)
+        tree = bound_projectors(scene, (template,), rows, asked, effort).found.tree
+        layers, before = [], tree.units
+        batch = tree.roots()
+        for _ in range(6):
+            batch = tree.children(batch.cells[:: max(1, batch.cells.size // 40)])
+            layers.append(batch.rows)
+        return np.concatenate(layers), tree.units - before
+
+    quick, little = cells()
+    monkeypatch.setattr(
+        PositionTree, "_certain", lambda _, seen, k: np.zeros(k.size, bool)
+    )
+    plain, much = cells()
+    np.testing.assert_array_equal(quick, plain)
+    assert little < much

@@ -188,7 +188,7 @@ def test_the_fewest_over_all_poses_count_those_that_are_given(existing, count, i
     scene, template = ball_scene(existing)
     stage = plan_projectors(scene, (template,), 300, rounds=1)
     assert stage.certificate.given == len(existing)
-    effort = Effort(finest=6, budget=1e9, shadows=np.inf, most_samples=600)
+    effort = Effort(finest=6, maps=6, budget=1e9, shadows=np.inf, most_samples=600)
     stage = prove_fewest(scene, stage, (template,), effort)
     proof = stage.certificate
     assert (proof.count, proof.status) == (count, "optimal")

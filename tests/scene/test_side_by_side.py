@@ -35,7 +35,7 @@ from planning.scene.workspace.view_tiles import poses_beside, tiled_poses
 from planning.steps.prepare import prepared
 from planning.verify.audit.devices.workspace_claims import outside_by
 
-EFFORT = Effort(finest=4, budget=1e7, shadows=0.0, most_samples=500)
+EFFORT = Effort(finest=4, maps=4, budget=1e7, shadows=0.0, most_samples=500)
 SHIFTED = PinholeModel(
     np.array([[1500.0, 0, 511.5], [0, 1500.0, 880.0], [0, 0, 1]]),
     (1024, 768),

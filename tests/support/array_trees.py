@@ -1,6 +1,7 @@
 """A tree of cells that exists as arrays, checked as it is made."""
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,7 @@ class ArrayTree:
     parents: NDArray[np.int64]
     rows: NDArray[np.uint64]
     n_rows: int
+    units: ClassVar[float] = 0.0
     _order: NDArray[np.int64] = field(init=False, repr=False)
     _starts: NDArray[np.int64] = field(init=False, repr=False)
 

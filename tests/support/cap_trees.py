@@ -18,6 +18,8 @@ SLACK = 1e-9
 class CapTree:
     """Cells around centres; subclasses say which."""
 
+    units = 0.0
+
     def __init__(self, points, radius, depth):
         self.points = np.asarray(points, dtype=float)
         self.radius, self.depth = radius, depth

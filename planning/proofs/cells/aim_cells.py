@@ -90,19 +90,23 @@ class AimTree(GrownTree):
         return owner, place, level + 1, aims
 
     def _coverage(
-        self, columns: Sequence[NDArray[Any]], may: NDArray[np.bool_]
-    ) -> NDArray[np.bool_]:
+        self,
+        columns: Sequence[NDArray[Any]],
+        may: NDArray[np.bool_],
+        sure: NDArray[np.bool_],
+    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         place, level, aim = columns
         covered = may & self.positions.covered(place)
         at, samples = np.nonzero(covered & (level != _EVERY)[:, None])
         # Of cells with every aim nothing is asked.
         middles, radii = directions_of(self._cubes, np.maximum(level, 0), aim)
         cells = self.positions.cells(place)
+        facing = self.positions.facing(cells)
         for pairs in parts(at.size, PAIRS):
             cell, sample = at[pairs], samples[pairs]
-            seen = self.positions.seen_from(cells, cell, sample)
+            seen = self.positions.seen_from(cells, facing, cell, sample)
             cosine = -np.einsum("ij,ij->i", middles[cell], seen.towards)
             reach = self._beta + radii[cell] + seen.psi + _ROUNDING
             passed = cosine >= np.cos(np.minimum(reach, np.pi)) - _ROUNDING
             covered[cell, sample] = passed
-        return covered
+        return covered, sure

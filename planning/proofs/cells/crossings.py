@@ -137,6 +137,17 @@ def nearest_cos(c: _Array, cone: Cone) -> _Array:
     return np.where(c >= cone.cosine, 1.0, c * cone.cosine + s * cone.sine)
 
 
+def farthest_cos(c: _Array, cone: Cone) -> _Array:
+    """Return the least |cosine| within psi of a direction whose |cosine| is c.
+
+    Of a vector of length 0 it is 0.
+    """
+    s = np.sqrt(np.maximum(1.0 - c * c, 0.0))
+    # At a right angle and beyond, the line is crossed.
+    crossed = (c <= cone.sine) | (cone.psi >= 0.5 * np.pi)
+    return np.where(crossed, 0.0, c * cone.cosine - s * cone.sine)
+
+
 def _least_sine(c: _Array, cone: Cone) -> _Array:
     """Return the least sine to a line within psi of a direction of cosine c to it."""
     s = np.sqrt(np.maximum(1.0 - c * c, 0.0))

@@ -10,16 +10,25 @@ from numpy.typing import NDArray
 from solvers.bit_rows import GrowingArray, pack_rows, unpack_rows, words_for
 from solvers.cells.cell_tree import CellBatch
 
+# Work of a cell, and of each of its samples that is looked at.
+_UNITS_PER_CELL, _UNITS_PER_PAIR = 6e4, 400.0
+
 
 class GrownTree(ABC):
-    """Keeps the cells made so far, and the bit row of each."""
+    """Keeps the cells made so far, and the bit row of each.
+
+    Attributes:
+        units: Counted work of the geometry asked so far.
+    """
 
     def __init__(self, roots: Sequence[NDArray[Any]], n_rows: int) -> None:
-        self.n_rows, self._n_roots = n_rows, len(roots[0])
+        self.n_rows, self._n_roots, self.units = n_rows, len(roots[0]), 0.0
         self._made: dict[int, NDArray[np.int64]] = {}
-        self._rows = GrowingArray(np.empty((0, words_for(n_rows)), np.uint64))
+        none = np.empty((0, words_for(n_rows)), np.uint64)
+        self._rows, self._sure = GrowingArray(none), GrowingArray(none)
         self._columns = [GrowingArray(column[:0]) for column in roots]
-        self._append(roots, np.ones((self._n_roots, n_rows), dtype=bool))
+        every = np.ones((self._n_roots, n_rows), dtype=bool)
+        self._append(roots, every, ~every)
 
     def roots(self) -> CellBatch:
         """Return the cells that hold every pose."""
@@ -49,21 +58,30 @@ class GrownTree(ABC):
         owner, columns = self._parts(names)
         order = np.argsort(owner, kind="stable")
         owner = owner[order]
-        may = self.covered(names[owner])
-        made = self._append([column[order] for column in columns], may)
+        may, sure = (
+            unpack_rows(rows.values[names[owner]], self.n_rows)
+            for rows in (self._rows, self._sure)
+        )
+        made = self._append([column[order] for column in columns], may, sure)
         starts = np.searchsorted(owner, np.arange(names.size + 1))
         for k, name in enumerate(names):
             self._made[int(name)] = made[starts[k] : starts[k + 1]]
 
     def _append(
-        self, columns: Sequence[NDArray[Any]], may: NDArray[np.bool_]
+        self,
+        columns: Sequence[NDArray[Any]],
+        may: NDArray[np.bool_],
+        sure: NDArray[np.bool_],
     ) -> NDArray[np.int64]:
         """Keep cells, with those of the samples of their parents that they cover."""
         first = self._rows.size
-        rows = pack_rows(self._coverage(columns, may))
+        self.units += _UNITS_PER_CELL * len(may)
+        self.units += _UNITS_PER_PAIR * np.count_nonzero(may & ~sure)
+        covered, sure = self._coverage(columns, may, sure)
         for column, values in zip(self._columns, columns, strict=True):
             column.append(values)
-        self._rows.append(rows)
+        self._rows.append(pack_rows(covered))
+        self._sure.append(pack_rows(sure))
         return np.arange(first, self._rows.size)
 
     @abstractmethod
@@ -74,6 +92,13 @@ class GrownTree(ABC):
 
     @abstractmethod
     def _coverage(
-        self, columns: Sequence[NDArray[Any]], may: NDArray[np.bool_]
-    ) -> NDArray[np.bool_]:
-        """Return which samples, of those that may be covered, cells cover."""
+        self,
+        columns: Sequence[NDArray[Any]],
+        may: NDArray[np.bool_],
+        sure: NDArray[np.bool_],
+    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return which samples, of those that may be covered, cells cover.
+
+        And for which no part of the cell would be found to miss them, so that they
+        aren't looked at again; `sure` are those for which that is known of the parent.
+        """

@@ -21,9 +21,10 @@ from planning.scene.workspace.admissible import may_be_admissible
 from solvers.bit_rows import parts
 
 from .grown_tree import GrownTree
+from .lit_cells import LitCells
 from .measurable_cells import MeasurableCells
 from .seen_cells import SeenCells
-from .shell_cells import Seen, ShellCells, directions_of, seen_from
+from .shell_cells import Facing, Seen, ShellCells, directions_of, seen_from
 
 # Pairs of cell and sample looked at together: they stay in the second-level cache.
 PAIRS = 1 << 13
@@ -39,6 +40,8 @@ class PositionTree(GrownTree):
         points: Samples in [m], shape (n_rows, 3).
         maps: Directions that are open to each sample, widened; None: all are.
         finest: Level beyond which directions aren't split.
+        closed: Directions that aren't, widened: where none is near, parts of a cell
+            need no look. None: all are looked at.
         limits: What else forbids samples; None: nothing.
     """
 
@@ -51,12 +54,14 @@ class PositionTree(GrownTree):
         maps: WidenedMaps | None,
         *,
         finest: int,
-        limits: MeasurableCells | SeenCells | None = None,
+        closed: WidenedMaps | None = None,
+        limits: LitCells | MeasurableCells | SeenCells | None = None,
     ) -> None:
         self._workspace, self._range = workspace, range_m
         self._points = points - np.array(workspace.centre)
         self._reach = float(np.linalg.norm(self._points, axis=1).max(initial=0.0))
-        self._maps, self._finest, self._limits = maps, finest, limits
+        self._maps, self._closed = maps, closed
+        self._finest, self._limits = finest, limits
         self._cubes = [CubeMap(1 << level) for level in range(finest + 1)]
         whole, (low, high) = np.arange(FACES), radius_m
         faces = ShellCells(0 * whole, whole, np.full(FACES, low), np.full(FACES, high))
@@ -93,15 +98,25 @@ class PositionTree(GrownTree):
         return owner, [np.concatenate(both) for both in zip(*finer, strict=True)]
 
     def _coverage(
-        self, columns: Sequence[NDArray[Any]], may: NDArray[np.bool_]
-    ) -> NDArray[np.bool_]:
-        cells, covered = ShellCells(*columns), np.zeros_like(may)
-        at, samples = np.nonzero(may & self._admissible(cells)[:, None])
+        self,
+        columns: Sequence[NDArray[Any]],
+        may: NDArray[np.bool_],
+        sure: NDArray[np.bool_],
+    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        cells = ShellCells(*columns)
+        facing = self.facing(cells)
+        admissible = self._admissible(cells, facing)[:, None]
+        sure = sure & admissible
+        covered = sure.copy()
+        at, samples = np.nonzero(may & ~sure & admissible)
         for pairs in parts(at.size, PAIRS):
             cell, sample = at[pairs], samples[pairs]
-            passed = self._passed(cells, cell, sample)
+            seen = self.seen_from(cells, facing, cell, sample)
+            passed = self._passed(seen, sample)
             covered[cell[passed], sample[passed]] = True
-        return covered
+            certain = passed[self._certain(seen.take(passed), sample[passed])]
+            sure[cell[certain], sample[certain]] = True
+        return covered, sure
 
     def widths(self, names: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return about how wide cells look from the centre [rad], shape (n,)."""
@@ -111,18 +126,23 @@ class PositionTree(GrownTree):
         deep = 0.5 * (cells.high_m - cells.low_m) * self._reach / cells.low_m
         return (side + deep) / cells.low_m
 
-    def seen_from(
-        self, cells: ShellCells, at: NDArray[np.int64], samples: NDArray[np.int64]
-    ) -> Seen:
-        """Return how samples see cells."""
-        directions = directions_of(self._cubes, cells.level, cells.cell)
-        return seen_from(cells, directions, at, self._points[samples])
+    def facing(self, cells: ShellCells) -> Facing:
+        """Return where cells are from the centre, for `seen_from`."""
+        return directions_of(self._cubes, cells.level, cells.cell)
 
-    def _passed(
-        self, cells: ShellCells, at: NDArray[np.int64], samples: NDArray[np.int64]
-    ) -> NDArray[np.int64]:
+    def seen_from(
+        self,
+        cells: ShellCells,
+        facing: Facing,
+        at: NDArray[np.int64],
+        samples: NDArray[np.int64],
+    ) -> Seen:
+        """Return how samples see cells; `facing` is that of all of these."""
+        return seen_from(cells, facing, at, self._points[samples])
+
+    def _passed(self, seen: Seen, samples: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the pairs of cell and sample that a device in the cell may cover."""
-        seen, (near, far) = self.seen_from(cells, at, samples), self._range
+        near, far = self._range
         ranged = seen.distance - seen.extent <= far
         pairs = np.flatnonzero(ranged & (seen.distance + seen.extent >= near))
         if self._limits is not None:
@@ -136,8 +156,26 @@ class PositionTree(GrownTree):
             pairs = pairs[self._maps.open(view.towards, view.psi, samples[pairs])]
         return pairs
 
-    def _admissible(self, cells: ShellCells) -> NDArray[np.bool_]:
+    def _certain(self, seen: Seen, samples: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return of which pairs no part of the cell would be found to miss the sample.
+
+        Of cameras that isn't asked.
+        """
+        near, far = self._range
+        if self._closed is None or not isinstance(self._limits, LitCells):
+            return np.zeros(samples.size, dtype=bool)
+        within = (seen.distance - seen.extent >= near) & (
+            seen.distance + seen.extent <= far
+        )
+        within &= self._limits.surely(samples, seen.towards, seen.psi)
+        some = np.flatnonzero(within)
+        within[some] = ~self._closed.open(
+            seen.towards[some], seen.psi[some], samples[some]
+        )
+        return within
+
+    def _admissible(self, cells: ShellCells, facing: Facing) -> NDArray[np.bool_]:
         """Return which cells may hold a position that all limits allow, shape (n,)."""
-        outwards, angle = directions_of(self._cubes, cells.level, cells.cell)
+        outwards, angle = facing
         low_m, high_m = cells.low_m, cells.high_m
         return may_be_admissible(self._workspace, outwards, angle, low_m, high_m)

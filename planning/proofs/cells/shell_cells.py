@@ -17,6 +17,8 @@ from geometry.directions.cube_map import CubeMap, quarters
 from geometry.mesh.tensors import lengths
 
 _ROUNDING = 1e-9
+# Unit middles of cells (n, 3), and the angle about each that holds it [rad], (n,).
+Facing = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 class ShellCells(NamedTuple):
@@ -78,7 +80,7 @@ class Seen(NamedTuple):
 
 def directions_of(
     cubes: Sequence[CubeMap], level: NDArray[np.int64], cell: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> Facing:
     """Return unit middles of cells, and the angle about each that holds the cell [rad].
 
     `cubes` are cube maps of 1, 2, 4, ... cells an edge.
@@ -93,7 +95,7 @@ def directions_of(
 
 def seen_from(
     cells: ShellCells,
-    directions: tuple[NDArray[np.float64], NDArray[np.float64]],
+    directions: Facing,
     at: NDArray[np.int64],
     points: NDArray[np.float64],
 ) -> Seen:

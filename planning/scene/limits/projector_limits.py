@@ -14,6 +14,7 @@ from planning.scene.codes.patterns import pattern_of
 from planning.scene.lights import light_of
 from planning.scene.samples import SampleColumns
 
+from .camera_limits import ROUNDING
 from .limit import (
     BY_OBSTACLE,
     Array,
@@ -67,6 +68,17 @@ class ProjectorView:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class LightCell:
+    """The best that light from anywhere in a cell of poses may have of k samples.
+
+    -N.L at most, and |T1.L| at least, shape (k,).
+    """
+
+    incidence_cos: Array
+    tangent_cos: Array
+
+
 class ProjectorBeam(Limit[ProjectorView, object, ProjectorLimits]):
     """Within the pattern, and in the light that leaves the device."""
 
@@ -103,7 +115,7 @@ class ProjectorRange(InRange):
         yield from islice(range_ends(self.name, "projector", sharp, sharp), 2)
 
 
-class ProjectorIncidence(Limit[ProjectorView, object, ProjectorLimits]):
+class ProjectorIncidence(Limit[ProjectorView, LightCell, ProjectorLimits]):
     """-N.L >= cos(theta_max)."""
 
     name = "projector_incidence"
@@ -113,13 +125,17 @@ class ProjectorIncidence(Limit[ProjectorView, object, ProjectorLimits]):
         """Return which samples face the light."""
         return view.incidence_cos >= np.cos(rules.max_incidence)
 
+    def may_hold(self, cell: LightCell, rules: ProjectorLimits) -> Mask:
+        """Return which samples may face light from the cell."""
+        return cell.incidence_cos >= np.cos(rules.max_incidence) - ROUNDING
+
     def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:
         """Yield a larger angle."""
         limit = facts.required.projector.max_incidence
         yield wider_angle(self.name, limit, lambda view: view.incidence_cos)
 
 
-class TangentAngle(Limit[ProjectorView, object, ProjectorLimits]):
+class TangentAngle(Limit[ProjectorView, LightCell, ProjectorLimits]):
     """|T1.L| <= cos(tau_min)."""
 
     name = "tangent_angle"
@@ -128,6 +144,10 @@ class TangentAngle(Limit[ProjectorView, object, ProjectorLimits]):
     def holds(self, view: ProjectorView, rules: ProjectorLimits) -> Mask:
         """Return which samples aren't lit along T1."""
         return view.tangent_cos <= np.cos(rules.min_tangent_angle)
+
+    def may_hold(self, cell: LightCell, rules: ProjectorLimits) -> Mask:
+        """Return which samples not all light from the cell meets along T1."""
+        return cell.tangent_cos <= np.cos(rules.min_tangent_angle) + ROUNDING
 
     def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:
         """Yield a smaller angle."""
