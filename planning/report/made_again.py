@@ -44,6 +44,11 @@ def why_not_again(plan: RigPlan) -> str:
     return ""
 
 
+def again_or_why_not(plan: RigPlan, threads: int) -> dict[str, Any] | str:
+    """Return parts of the document as they come out again, or why they can't."""
+    return why_not_again(plan) or made_again(plan, threads=threads)
+
+
 def made_again(plan: RigPlan, *, threads: int) -> dict[str, Any]:
     """Return parts of the document as they come out again; keys are the document's.
 

@@ -12,6 +12,7 @@ from planning.verify.audit.counts.certificate_claims import (
 )
 from planning.verify.audit.counts.cost_claims import audit_cost
 from planning.verify.audit.counts.joint_claims import audit_joint
+from planning.verify.audit.counts.marginal_claims import audit_marginal
 from planning.verify.audit.counts.overlap_claims import (
     audit_groups,
     audit_overlaps,
@@ -76,6 +77,7 @@ _CLAIMS = (
     audit_regions,
     audit_floors,
     audit_tables,
+    audit_marginal,
     audit_shares,
     audit_certificates,
     audit_joint,
