@@ -47,7 +47,10 @@ def hold_claims(
     made = again(plan, threads)
     if isinstance(made, str):
         return (), f"within tolerances: {made}"
-    return compare_again(plan.to_document(), made), EXACTLY
+    false = compare_again(plan.to_document(), made)
+    if plan.document.request is None:
+        false += ("request: is missing, and what made this plan always writes it",)
+    return false, EXACTLY
 
 
 def _made_apart(plan: RigPlan, seed: int) -> str:

@@ -31,7 +31,7 @@ NO_CLAIM = {
     "rig.name": "words of the rig file's author",
     "rig.description": "as rig.name",
     "rig.notes": "as rig.name",
-    "rig.*.name": "what a device is called; which model a plan's device is of is a claim",
+    "rig.*.name": "what a device is called; of which model one is, is a claim",
     "rig.*.sources": "where the author has a figure from, in words",
     "rig.calibration.description": "as rig.name",
     "coverage.relaxations": "advice",
@@ -116,9 +116,11 @@ def taken_on_trust(
     ]
     if unnamed:
         lines.append(
-            f"marginal, rows {', '.join(map(str, unnamed))}: the file doesn't say where "
-            f"those devices stand"
+            f"marginal, rows {', '.join(map(str, unnamed))}: the file doesn't say "
+            f"where those devices stand"
         )
+    if plan.document.request is None:
+        lines.append("what was asked: the plan has no request beside its requirements")
     record = plan.document.meshes[0]
     if mesh is None:
         path = record.path or "FILE"

@@ -75,6 +75,7 @@ class Coverage(Part):
         relaxations: What would let projectors reach enough.
         unmeasurable_by_cause: Lit target area that no reference camera measures.
         camera_relaxations: What would let cameras reach enough.
+        asked: Digest of what was asked of the plan, `asked_digest`.
     """
 
     samples: int
@@ -89,6 +90,7 @@ class Coverage(Part):
     relaxations: tuple[Relaxation, ...] = ()
     unmeasurable_by_cause: dict[str, float] = Field(default={})
     camera_relaxations: tuple[Relaxation, ...] = ()
+    asked: str | None = None
 
 
 class RobustRecord(Part):

@@ -6,8 +6,9 @@ from typing import Any
 from .audit_findings import AuditFindings
 
 # Where a part that came out again lacks a key, the plan has no business with it either;
-# but for advice, which takes the search to give, and for parts of parts.
-_ADVICE = {"relaxations", "camera_relaxations"}
+# but for advice, which takes the search to give, for what the audit compares, and for
+# parts of parts.
+_ELSEWHERE = {"relaxations", "camera_relaxations", "asked"}
 _PARTLY = {"meshes", "requirements", "ring_axes", "surface", "survival"}
 # So many figures that differ are told.
 _MOST_TOLD = 8
@@ -45,7 +46,7 @@ def _differing(
     if isinstance(made, Mapping) and isinstance(claimed, Mapping):
         for name, part in made.items():
             yield from _differing(claimed.get(name), part, f"{key}.{name}", whole=whole)
-        for name in set(claimed) - set(made) - _ADVICE if whole else ():
+        for name in set(claimed) - set(made) - _ELSEWHERE if whole else ():
             yield (
                 f"{key}.{name}",
                 f"claimed {claimed[name]!r}, no such figure comes out",

@@ -52,6 +52,7 @@ from planning.verify.audit.stations.station_claims import audit_stations
 
 from .audit_case import N_SAMPLES, AuditCase, examine
 from .audit_findings import AuditFindings
+from .request_claims import audit_request
 
 _CLAIMS = (
     audit_devices,
@@ -88,6 +89,7 @@ _CLAIMS = (
     audit_rings,
     audit_ring_axes,
     audit_limits,
+    audit_request,
     audit_scales,
     audit_cost,
 )
@@ -115,6 +117,7 @@ _CLAIMS_OF_VIEWS = (
     audit_baselines,
     audit_groups,
     audit_limits,
+    audit_request,
     audit_scales,
     audit_cost,
 )
