@@ -86,6 +86,17 @@ ON_TRUST = {
 _OF_FILE = "the mesh file, its digest, size and repairs (meshes): give --mesh {path}"
 
 
+def is_trusted(key: str) -> bool:
+    """Return whether a claim is among those that are held against others alone.
+
+    What the plan was made with decides how closely figures are held, and the mesh file
+    is looked at where it is given: verify tells of either.
+    """
+    own = ("made_with", "meshes.*.*")
+    patterns = (*(p for parts in ON_TRUST.values() for p in parts), *own)
+    return is_under(key, dict.fromkeys(patterns, ""))
+
+
 def taken_on_trust(
     plan: RigPlan,
     mesh: TriangleMesh | None,

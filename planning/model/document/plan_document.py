@@ -99,7 +99,7 @@ class PlanDocument(Part):
     format: Literal["ringrig-plan"]
     version: Literal[1]
     units: Units
-    seed: int
+    seed: Annotated[int, Field(ge=0)]
     created: str
     made_with: MadeWith | None = None
     command: tuple[str, ...]

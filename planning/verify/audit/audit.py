@@ -176,6 +176,22 @@ def audited(case: AuditCase) -> Audit:
     return Audit(findings.failures, _unmet_requirements(plan), case)
 
 
+def first_false(case: AuditCase, *, quick: bool = False) -> tuple[str, ...]:
+    """Return what the first audit that finds anything finds, the quick ones first.
+
+    Or those alone. For who only asks whether a plan with projectors holds.
+    """
+    slow = audit_inside, audit_floors, audit_rings, audit_marginal, audit_ring_axes
+    for audit_claims in sorted(_CLAIMS, key=lambda claims: claims in slow):
+        if quick and audit_claims in slow:
+            break
+        findings = AuditFindings()
+        audit_claims(case, findings)
+        if findings.failures:
+            return findings.failures
+    return ()
+
+
 def _unmet_requirements(plan: RigPlan) -> tuple[str, ...]:
     """Return one sentence for each requirement on the target that isn't met.
 
