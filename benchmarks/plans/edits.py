@@ -13,14 +13,14 @@ digest is made anew, as a forger would, who isn't the check's author. Devices ar
 moved by 0.02 mm and turned by 0.002 degrees, ring frames alike.
 
 Each edited plan is read, audited, and its claims are computed again; what passes so far
-and may move something that is seen is rendered and decoded, as `plan verify` does with
+and moves something that is seen is rendered and decoded, as `plan verify` does with
 every plan. Of other edits the figures of the check, the samples and, where they can't
-matter, the claims that come out again are those of the plan as made; and of what is no claim the slowest
-audits are left out. Prints for each section how many
-edits were refused when read (exit 3), found (exit 1), passed, or crashed; then each
-kind of which one passed.
-`planning.verify.trust` says what is no claim, each with its reason, and what verify
-tells is taken on trust. Returns 1 where another passes, or anything crashes.
+matter, the claims that come out again are those of the plan as made; and of what is no
+claim the slowest audits are left out. Prints for each section how many edits were
+refused when read (exit 3), found (exit 1), passed, or crashed; then each kind of which
+one passed. `planning.verify.trust` says what is no claim, each with its reason, and
+what verify tells is taken on trust. Returns 1 where another passes, or anything
+crashes.
 """
 
 import argparse
@@ -144,7 +144,8 @@ class Judge:
         """
         try:
             plan = self._forged(edited)
-            if plan.document.surface.sha256 != self._plan.document.surface.sha256:
+            here, made = plan.document.surface, self._plan.document.surface
+            if (here.sha256, here.path) != (made.sha256, made.path):
                 return "refused"
             found = any(self._false(plan, section, quick=quick))
             return "found" if found else "passed"

@@ -72,6 +72,14 @@ ON_TRUST = {
         "certificates.*.alone",
         "certificates.*.routes",
     ),
+    "how the rig's optics follow from its figures, and how many poses it offered": (
+        "rig.projector.figures",
+        "rig.camera.figures",
+        "rig.more_*.figures",
+        "rig.projector.distortion",
+        "rig.n_candidate_*",
+    ),
+    "that the run was, or wasn't, cut": ("truncated",),
     "the numbers that survival takes": ("survival.projectors", "survival.cameras"),
     "what planning both kinds together saved": ("joint",),
     "numbers of heads or steps, and their bounds": ("stations.n_*", "stations.bound"),
@@ -92,7 +100,8 @@ def is_trusted(key: str) -> bool:
     What the plan was made with decides how closely figures are held, and the mesh file
     is looked at where it is given: verify tells of either.
     """
-    own = ("made_with", "meshes.*.*")
+    files = ("sha256", "unit", "scale_to_m", "n_vertices", "n_faces", "repairs")
+    own = ("made_with", *(f"meshes.*.{name}" for name in files))
     patterns = (*(p for parts in ON_TRUST.values() for p in parts), *own)
     return is_under(key, dict.fromkeys(patterns, ""))
 

@@ -45,7 +45,9 @@ def _differing(
         return
     if isinstance(made, Mapping) and isinstance(claimed, Mapping):
         for name, part in made.items():
-            yield from _differing(claimed.get(name), part, f"{key}.{name}", whole=whole)
+            yield from _differing(
+                claimed.get(name, "nothing"), part, f"{key}.{name}", whole=whole
+            )
         for name in set(claimed) - set(made) - _ELSEWHERE if whole else ():
             yield (
                 f"{key}.{name}",

@@ -22,6 +22,21 @@ _CALIBRATION = (
     ("principal_px", "principal_px", 1.0),
 )
 
+# What a rig states in full wherever a plan says what was asked of it.
+_STATED = {
+    "requirements": (
+        *("coverage", "dominant_coverage", "min_reachable"),
+        *("region_coverage", "region_share"),
+    ),
+    "limits": (
+        *("projector_max_incidence_deg", "min_tangent_angle_deg"),
+        *("camera_max_incidence_deg", "max_sample_distance_mm", "min_conditioning"),
+        *("noise_px", "min_ring_pitch_px", "max_sigma_mm", "ring_sigma_mm"),
+        *("min_angle_deg", "max_angle_deg"),
+    ),
+    "check": (*(f"{name}_mm" for name in _CHECK), *_SHARES, "ambient"),
+}
+
 # Key and value of what was used, key and value of what was asked or is available.
 _Pair = tuple[str, Any, str, Any]
 
@@ -35,9 +50,24 @@ def audit_request(case: AuditCase, findings: AuditFindings) -> None:
     request = case.plan.document.request
     if request is not None:
         pairs += [*_of_request(case.plan, request), *_defaults(case.plan, request)]
+        _audit_stated(case.plan, findings.at("rig"))
     for key, used, whose, asked in pairs:
         findings.same(key, used, asked, whose, _ROUNDING)
     _audit_digests(case.plan, findings)
+
+
+def _audit_stated(plan: RigPlan, findings: AuditFindings) -> None:
+    """Check that the rig states what is compared: a limit left out binds nothing."""
+    rig = plan.document.rig
+    for table, names in _STATED.items():
+        stated = getattr(rig, table)
+        for name in names:
+            findings.holds(name in stated, f"{table}.{name}", "is missing")
+    for name in ("standoff_m", "standoff_play_m"):
+        findings.holds(getattr(rig, name) is not None, name, "is missing")
+    for place, model in enumerate(rig.models("projector")):
+        key = "projector" if place == 0 else f"more_projectors.{place - 1}"
+        findings.same(f"{key}.light", model.light, rig.light, "rig.light")
 
 
 def _of_request(plan: RigPlan, request: RequestRecord) -> Iterator[_Pair]:
