@@ -19,6 +19,12 @@ from .ring_records import RingAxis
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Number = Annotated[int, Field(ge=0)]
+# What has a default; numbers of projectors and the pattern are stated always.
+Given = (
+    Literal["max_cameras", "max_heads", "target", "dominant_coverage", "coverage"]
+    | Literal["min_reachable", "region_coverage", "accuracy_mm", "accuracy_of", "up"]
+    | Literal["ring_axis", "robust", "views", "survive", "joint"]
+)
 
 
 class RequestRecord(Part):
@@ -34,10 +40,10 @@ class RequestRecord(Part):
         views: None: the fewest that measure.
     """
 
-    given: tuple[str, ...]
+    given: tuple[Given, ...]
     max_projectors: Number
     max_cameras: Number | None
-    max_heads: Number | None = None
+    max_heads: Number | None
     target: Literal["dominant", "surface"]
     pattern: Literal["rings", "dense", "none"]
     dominant_coverage: Share
@@ -47,12 +53,12 @@ class RequestRecord(Part):
     accuracy_mm: float | None
     accuracy_of: Literal["noise", "total"]
     up: Literal["x", "y", "z", "-x", "-y", "-z"]
-    ring_axis: RingAxis | None = None
-    robust: Share | None = None
-    views: Number | None = None
-    survive: Number = 0
-    joint: bool = False
-    cameras_by: CamerasBy = "both"
+    ring_axis: RingAxis | None
+    robust: Share | None
+    views: Number | None
+    survive: Number
+    joint: bool
+    cameras_by: CamerasBy
 
 
 def asked_digest(

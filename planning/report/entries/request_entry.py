@@ -8,8 +8,8 @@ from planning.report.partial_plan import PlanRequest
 from planning.rig.wishes import Wishes
 
 _SHARES = ("coverage", "dominant_coverage", "min_reachable", "region_coverage")
-# What every plan is asked for, whoever asks.
-_NO_DEFAULT = ("max_projectors", "pattern")
+# By every request, of whom nobody asks whether it did.
+_STATED = ("max_projectors", "pattern")
 
 
 def request_record(request: PlanRequest) -> RequestRecord:
@@ -18,13 +18,13 @@ def request_record(request: PlanRequest) -> RequestRecord:
     given = [
         field.name
         for field in fields(Wishes)
-        if field.name in _NO_DEFAULT or getattr(wishes, field.name) != field.default
+        if field.name not in _STATED and getattr(wishes, field.name) != field.default
     ]
     stated = {name: getattr(wishes, name) for name in _SHARES}
     accuracy = wishes.accuracy_mm
     axis = wishes.ring_axis or request.rig.rings.axis
     return RequestRecord(
-        given=tuple(given),
+        given=tuple(given),  # type: ignore[arg-type]
         max_projectors=wishes.max_projectors,
         max_cameras=wishes.max_cameras,
         max_heads=wishes.max_heads,

@@ -112,6 +112,16 @@ def _of_request(plan: RigPlan, request: RequestRecord) -> Iterator[_Pair]:
         have = (1, 0) if kept is None else (kept.views, kept.survive)
         asks = request.views or 1, request.survive
         yield "requirements.survival", have, "request.views, request.survive", asks
+    heads, stations = request.max_heads is not None, document.stations is not None
+    if document.rig.turntable is None:
+        yield "stations (there)", stations, "request.max_heads (there)", heads
+    if not document.truncated:
+        yield (
+            "joint (there)",
+            document.joint is not None,
+            "request.joint",
+            (request.joint),
+        )
     axes = document.ring_axes
     if axes is not None:
         yield "ring_axes.asked", axes.asked, "request.ring_axis", request.ring_axis
