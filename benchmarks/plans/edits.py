@@ -197,7 +197,7 @@ class Judge:
         return pixels.record()
 
 
-def _renew(edited: Any, path: _Path, made: Any, digest: str) -> None:  # noqa: ANN401
+def _renew(edited: Any, path: tuple[Any, ...], made: Any, digest: str) -> None:  # noqa: ANN401
     """Replace a digest that wasn't itself edited."""
     for key in path[:-1]:
         if not isinstance(edited, dict | list) or (

@@ -128,6 +128,12 @@ def _marginal(
         elif isinstance(row, CameraMarginal) and row.reference is not None:
             chosen = tuple(devices.reference_cameras[k] for k in row.reference)
             views[row.n_cameras] = OfNumber(chosen, row.reference)
+    for numbers in (lights, views):
+        # One more than the plan's is never less than one fewer: that must be known.
+        planned = next(iter(numbers))
+        for n in sorted(numbers):
+            if n > planned and n - 1 not in numbers:
+                del numbers[n]
     records = [record.rings for record in plan.document.projectors]
     evenly = tuple(map(evenly_ringed, devices.projectors, records))
     rows = marginal_records(scene, devices, claims, (lights, views), evenly)

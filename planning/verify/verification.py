@@ -177,6 +177,7 @@ def _verify_family(
         ),
         worst.reconstruction,
         members=tuple(found),
+        trusted=tuple(f"{n}: {line}" for n, one in found for line in one.trusted),
     )
 
 

@@ -190,7 +190,9 @@ def _of_rig(plan: RigPlan) -> Iterator[_Pair]:
             errors = used.triangulation.calibration
             value = 0.0 if errors is None else getattr(errors, name)
             where = f"requirements.triangulation.calibration.{name}"
-            yield where, value, f"rig.calibration.{key}", unit * stated
+            whose = f"rig.calibration.{key}"
+            number = isinstance(stated, int | float)
+            yield where, value, whose, unit * stated if number else stated
 
 
 def _metres(length_mm: float | None) -> float | None:

@@ -25,11 +25,16 @@ from planning.verify.audit.predicates.reference_devices import (
 def audit_marginal(case: AuditCase, findings: AuditFindings) -> None:
     """Check both areas of each row of `marginal` that says where its devices stand."""
     document, least = case.plan.document, dict[str, tuple[float, float]]()
-    light = _Light(case)
+    light, last = _Light(case), dict[str, int]()
     for row in document.marginal:
         kind, number, areas = _figures(row)
         below = findings.at(f"marginal.{kind}s.{number}")
         planned = len(getattr(document, f"{kind}s"))
+        below.holds(
+            number <= planned or last.get(kind) == number - 1,
+            "",
+            f"no row of {number - 1} stands before it, which it adds one to",
+        )
         places = row.reference
         if places is not None and below.holds(
             number != planned and len(set(places)) == len(places) <= number,
@@ -49,7 +54,7 @@ def audit_marginal(case: AuditCase, findings: AuditFindings) -> None:
                 truth = max(case.estimator.area(chosen), floor)
                 below.number(f"{part}_m2", claimed, truth, slack)
         if number >= planned:
-            least[kind] = areas
+            least[kind], last[kind] = areas, number
 
 
 def _figures(
