@@ -115,6 +115,29 @@ def test_marginal_rows_are_those_of_the_poses_they_name(plan):
         forged(plan, nowhere)
 
 
+def test_a_row_of_more_devices_follows_the_one_it_adds_to(plan):
+    def later(document):
+        rows = [row for row in document["marginal"] if "n_cameras" in row]
+        rows[-1]["n_cameras"] += 1
+
+    (failure,) = (
+        line
+        for line in found(forged(plan, later), again=None).failures
+        if "stands before it" in line
+    )
+    assert failure.startswith("marginal.cameras.")
+
+
+@pytest.mark.parametrize("value", [{"x": 1}, "much", [[1.0], 2.0], True])
+def test_a_rig_table_that_holds_anything_is_told_and_never_crashes(plan, value):
+    def change(document):
+        document["rig"]["workspace"]["up"] = value
+        document["rig"]["rings"]["axis"] = value
+
+    failures = found(forged(plan, change), again=None).failures
+    assert any(line.startswith("request.up: claimed 'z'") for line in failures)
+
+
 def test_what_is_loosened_afterwards_is_named_with_its_pair(plan):
     def used(document):
         document["requirements"]["coverage"] = 0.5
