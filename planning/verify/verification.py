@@ -127,7 +127,8 @@ def verify_plan(
     held = "", ""
     failures = [*audit.failures, *differs]
     if not failures:
-        say("claims: computed again by the code that made them")
+        if again is not None:
+            say("claims: computed again by the code that made them")
         again_false, how_claims = hold_claims(plan, again, threads)
         failures += again_false
         held = how_claims, ""
