@@ -1,28 +1,39 @@
-"""Edit every leaf of a plan file: what `plan verify` refuses, finds and lets by.
+"""Edit every kind of leaf of a plan file: what `plan verify` refuses, finds, lets by.
 
-Usage: python -m benchmarks.plans.edits [--share 0.1] [--seed 0] [PLAN]   (ringrig
+Usage: python -m benchmarks.plans.edits [--seed 0] [--only KEY,...] [PLAN]   (ringrig
     installed, from a checkout)
 
-Plans a sample head with few candidates (or takes PLAN, a folder), checked from pixels.
-Then every leaf of `plan.json` (a share of them, drawn) is edited in six ways or more:
+Plans a sample head of 1,500 faces with few candidates (or takes PLAN, a folder that
+this code made), checked from pixels. A kind is a key with numbers of lists wildcarded
+(`regions.*.area_m2`). Of each kind leaves are drawn, and edited in six ways or more:
 numbers by a per mille, by a tenth, by one, times 500, to 0, to their negative; words,
-truths and lists to others; and any of them to null, to another type, or left out. Each
-edited plan is read and audited, and its recorded check is compared with that of the
-plan as made: pixels are rendered once, since no edit of these figures moves a device.
-Prints for each section of the plan how many edits were refused when read (exit 3),
-found by the audit (exit 1), passed, or crashed; then the leaves at which one passed.
-Those of `NO_CLAIM` are no claims, each with its reason. Returns 1 where another passes,
-or anything crashes.
+truths and lists to others; and any of them to null, to another type, or left out. What
+stands in a plan twice, coverage and check as the member's, is edited twice; then every
+digest is made anew, as a forger would, who isn't the check's author. Devices are also
+moved by 0.02 mm and turned by 0.002 degrees, ring frames alike.
+
+Each edited plan is read, audited, and its claims are computed again; what passes so far
+and moves something that is seen is rendered and decoded, as `plan verify` does with
+every plan. Of other edits the figures of the check, the samples and, where they can't
+matter, the claims that come out again are those of the plan as made; and of what is no
+claim the slowest audits are left out. Prints for each section how many edits were
+refused when read (exit 3), found (exit 1), passed, or crashed; then each kind of which
+one passed. `planning.verify.trust` says what is no claim, each with its reason, and
+what verify tells is taken on trust. Returns 1 where another passes, or anything
+crashes.
 """
 
 import argparse
 import copy
-import json
+import os
+import platform
 import subprocess
 import sys
 import tempfile
+import time
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -30,8 +41,16 @@ import numpy as np
 
 from planning import RigPlan
 from planning.cli.other_commands import write_sample
+from planning.model.document.check_records import ReconstructionRecord
+from planning.model.document.request_records import asked_digest
 from planning.model.errors import PlanningError
-from planning.verify.verification import hold_figures, verify_plan
+from planning.report.made_again import again_or_why_not, made_again
+from planning.verify.audit.audit import first_false
+from planning.verify.audit.audit_case import examine
+from planning.verify.audit.figure_claims import contradictions
+from planning.verify.held_figures import EXACTLY, hold_claims, hold_figures
+from planning.verify.trust import NO_CLAIM, is_trusted, is_under
+from planning.verify.verification import verify_plan
 
 from .speed import RUN
 
@@ -44,14 +63,12 @@ n_candidate_cameras = 60
 n_reference_projectors = 600
 n_reference_cameras = 400
 """
-# What isn't a claim about the rig or what it measures, by the path's beginning.
-NO_CLAIM = {
-    "created": "when the plan was made",
-    "command": "how it was asked for, in the user's words",
-    "timings_s": "wall time of that run",
-    "cost.t": "wall time of that run",
-    "meshes.0.path": "where the file lay",
-}
+# What is rendered beside the surface; what samples and claims that come out again
+# depend on, too, of a rig with one model of either kind.
+_RENDERED = {"projectors", "cameras", "seed"}
+_SEEN = {*_RENDERED, "requirements"}
+_AGAIN = {*_SEEN, "marginal", "ring_axes", "surface"}
+_MOVES_M, _TURNS_DEG = (2e-5, 1e-4, 1e-3), (0.002, 0.02, 0.2)
 _Path = tuple[str | int, ...]
 _GONE = object()
 
@@ -59,33 +76,137 @@ _GONE = object()
 def main() -> int:
     """Print the tables."""
     parser = argparse.ArgumentParser()
-    parser.add_argument("--share", type=float, default=1.0)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--only", default="")
     parser.add_argument("plan", nargs="?", type=Path)
     asked = parser.parse_args()
-    rng = np.random.default_rng(asked.seed)
+    only = tuple(asked.only.split(","))
+    rng, begin = np.random.default_rng(asked.seed), time.perf_counter()
     with tempfile.TemporaryDirectory() as name:
         folder = asked.plan or _made(Path(name))
-        document = json.loads((folder / "plan.json").read_text())
-        plan = RigPlan.load(folder / "plan.json")
-        pixels = verify_plan(plan).reconstruction
-        assert pixels is not None
+        judge = Judge(RigPlan.load(folder / "plan.json"))
+        leaves: dict[str, list[tuple[_Path, Any]]] = defaultdict(list)
+        for path, value in _leaves(judge.document):
+            leaves[_kind(path)].append((path, value))
         ended: dict[str, Counter[str]] = defaultdict(Counter)
         let_by: dict[str, list[str]] = defaultdict(list)
-        for path, value in _leaves(document):
-            if rng.random() >= asked.share:
+        for kind, of_kind in leaves.items():
+            if not kind.startswith(only):
                 continue
+            path, value = of_kind[int(rng.integers(len(of_kind)))]
             for what, other in _edits(value):
-                edited = _with(document, path, other)
-                how = _judged(edited, plan, pixels.record())
-                told = ".".join(map(str, path))
-                if how == "passed" and any(told.startswith(key) for key in NO_CLAIM):
-                    how = "no claim"
-                ended[str(path[0])][how.split(":")[0]] += 1
-                if how not in ("refused", "found", "no claim"):
-                    let_by[told].append(f"{what}: {how}")
-    _print(ended, let_by)
-    return int(bool(let_by))
+                how = judge.edited(path, other)
+                print(f"{kind}: {what}: {how}", file=sys.stderr)
+                if how == "passed":
+                    how = _excused(".".join(map(str, path)))
+                _note(ended, let_by, kind, f"{what}: {how}", how)
+        for kind, what, edited in _moved(judge.document):
+            if kind.startswith(only):
+                how = judge.judged(edited, "projectors")
+                _note(ended, let_by, kind, f"{what}: {how}", how)
+    n = sum(map(len, leaves.values()))
+    print(
+        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
+        f"cores; {n} leaves of {len(leaves)} kinds, seed {asked.seed}, "
+        f"{time.perf_counter() - begin:.0f} s\n"
+    )
+    return int(_print(ended, let_by))
+
+
+class Judge:
+    """Judges edited plans by the figures of one check of the plan as made."""
+
+    def __init__(self, plan: RigPlan) -> None:
+        found = verify_plan(plan, again=again_or_why_not)
+        assert found.passed, found.failures
+        assert found.claims_held == found.compared == EXACTLY, found.summary()
+        assert found.reconstruction is not None
+        self._plan, self.document = plan, plan.to_document()
+        self._case, self._made = found.audit.case, made_again(plan, threads=1)
+        self._fresh = found.reconstruction.record()
+
+    def edited(self, path: _Path, value: object) -> str:
+        """How the plan ends with another value at a place, and wherever it is again."""
+        edited = copy.deepcopy(self.document)
+        _put(edited, path, value)
+        if path[0] in ("coverage", "reconstruction"):
+            _put(edited, ("members", 0, *path), value)
+        excused = _excused(".".join(map(str, path))) != "passed"
+        return self.judged(edited, str(path[0]), quick=excused)
+
+    def judged(
+        self, edited: dict[str, Any], section: str, *, quick: bool = False
+    ) -> str:
+        """How a plan file ends that was edited there: refused, found, passed, crashed.
+
+        As in `verify_plan`, but what is quick comes first, or alone, and what the
+        section has no part in isn't done again.
+        """
+        try:
+            plan = self._forged(edited)
+            here, made = plan.document.surface, self._plan.document.surface
+            if (here.sha256, here.path) != (made.sha256, made.path):
+                return "refused"
+            found = any(self._false(plan, section, quick=quick))
+            return "found" if found else "passed"
+        except PlanningError:
+            return "refused"
+        except Exception as error:
+            return f"crashed: {type(error).__name__}: {error}"
+
+    def _false(self, plan: RigPlan, section: str, *, quick: bool) -> Iterator[object]:
+        """Yield what of a plan is false, check by check."""
+        document, limits = plan.document, plan.requirements.check
+        yield document.reconstruction is None
+        yield contradictions(document.reconstruction, limits, plan.digest)
+        fresh, seed = self._fresh, document.seed
+        if section not in _RENDERED:
+            yield hold_figures(plan, fresh, seed)[0]
+        if section not in _SEEN:
+            whole = replace(self._case.estimator, n_claimed=document.coverage.samples)
+            case = replace(self._case, plan=plan, estimator=whole)
+            yield first_false(case, quick=quick)
+        else:
+            yield first_false(examine(plan, seed=seed, threads=1), quick=quick)
+        if quick:
+            return
+        made = self._made if section not in _AGAIN else None
+        yield hold_claims(plan, lambda one, n: made or again_or_why_not(one, n), 1)[0]
+        if section in _RENDERED:
+            yield hold_figures(plan, self._again(plan), seed)[0]
+
+    def _forged(self, edited: dict[str, Any]) -> RigPlan:
+        """The plan with all its digests made anew, where they still stand."""
+        plan = RigPlan.from_document(edited, self._plan.surface)
+        read = plan.document
+        digest = asked_digest(read.request, read.requirements, read.rig)
+        for path in (
+            *(("coverage",), ("certificates",), ("reconstruction",)),
+            *(("members", 0, "coverage"), ("members", 0, "reconstruction")),
+        ):
+            _renew(edited, (*path, "asked"), self.document, digest)
+        plan = RigPlan.from_document(edited, self._plan.surface)
+        for path in (("reconstruction",), ("members", 0, "reconstruction")):
+            _renew(edited, (*path, "plan"), self.document, plan.digest)
+        return RigPlan.from_document(edited, self._plan.surface)
+
+    @staticmethod
+    def _again(plan: RigPlan) -> ReconstructionRecord:
+        pixels = verify_plan(plan).reconstruction
+        assert pixels is not None
+        return pixels.record()
+
+
+def _renew(edited: Any, path: tuple[Any, ...], made: Any, digest: str) -> None:  # noqa: ANN401
+    """Replace a digest that wasn't itself edited."""
+    for key in path[:-1]:
+        if not isinstance(edited, dict | list) or (
+            isinstance(edited, dict) and key not in edited
+        ):
+            return
+        edited, made = edited[key], made[key]
+    if isinstance(edited, dict) and edited.get(path[-1]) == made.get(path[-1]):
+        edited[path[-1]] = digest
 
 
 def _made(folder: Path) -> Path:
@@ -97,8 +218,12 @@ def _made(folder: Path) -> Path:
     return folder / "plan"
 
 
+def _kind(path: _Path) -> str:
+    return ".".join("*" if isinstance(key, int) else key for key in path)
+
+
 def _leaves(value: object, path: _Path = ()) -> Iterator[tuple[_Path, Any]]:
-    if isinstance(value, dict):
+    if isinstance(value, dict) and value:
         for key, part in value.items():
             yield from _leaves(part, (*path, key))
     elif isinstance(value, list) and value:
@@ -126,6 +251,7 @@ def _edits(value: Any) -> Iterator[tuple[str, Any]]:  # noqa: ANN401
             "times 500": value * 500,
             "zero": value * 0,
             "negative": -value,
+            "a little": value + 1e-3 if isinstance(value, float) else value + 2,
         }
         yield from ((key, v) for key, v in edits.items() if v != value)
         yield "word", "much"
@@ -142,45 +268,77 @@ def _edits(value: Any) -> Iterator[tuple[str, Any]]:  # noqa: ANN401
         yield "list of two", [1, 2]
 
 
-def _with(document: dict[str, Any], path: _Path, value: object) -> dict[str, Any]:
-    edited = copy.deepcopy(document)
-    place: Any = edited
+def _moved(document: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, Any]]]:
+    """Yield plans of which one device, or a ring frame, stands a little elsewhere."""
+    for kind in ("projectors", "cameras"):
+        frames = [("world_from_device",)]
+        if kind == "projectors":
+            both = "world_from_device", "world_from_ring"
+            frames += [("world_from_ring",), both]
+        for names in frames:
+            for words, change in (*_shifts(), *_turns()):
+                edited = copy.deepcopy(document)
+                for name in names:
+                    pose = np.array(edited[kind][0][name])
+                    edited[kind][0][name] = change(pose).tolist()
+                yield f"{kind}.*.{' and '.join(names)}", words, edited
+
+
+def _shifts() -> Iterator[tuple[str, Callable[[np.ndarray], np.ndarray]]]:
+    for length in _MOVES_M:
+        step = np.zeros((4, 4))
+        step[0, 3] = length
+        yield f"moved by {1e3 * length:g} mm", lambda pose, step=step: pose + step
+
+
+def _turns() -> Iterator[tuple[str, Callable[[np.ndarray], np.ndarray]]]:
+    for angle in _TURNS_DEG:
+        c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+        turn = np.eye(4)
+        turn[1:3, 1:3] = [[c, -s], [s, c]]
+        yield f"turned by {angle:g} degrees", lambda pose, turn=turn: pose @ turn
+
+
+def _put(document: dict[str, Any], path: _Path, value: object) -> None:
+    place: Any = document
     for key in path[:-1]:
         place = place[key]
     if value is _GONE:
         del place[path[-1]]
     else:
-        place[path[-1]] = value
-    return edited
+        place[path[-1]] = copy.deepcopy(value)
 
 
-def _judged(edited: dict[str, Any], plan: RigPlan, fresh: Any) -> str:  # noqa: ANN401
-    """How a plan file ends: refused, found, passed, or the exception that it raises."""
-    try:
-        other = RigPlan.from_document(edited, plan.surface)
-        if other.document.surface.sha256 != plan.document.surface.sha256:
-            return "refused"
-        found = verify_plan(other, check_pixels=False).failures
-        found += tuple(hold_figures(other, fresh, plan.document.seed)[0])
-    except PlanningError:
-        return "refused"
-    except Exception as error:
-        return f"crashed: {type(error).__name__}: {error}"
-    if found or other.document.reconstruction is None:
-        return "found"
-    return "passed"
+def _excused(key: str) -> str:
+    key = key.removeprefix("members.0.")
+    if is_under(key, NO_CLAIM):
+        return "no claim"
+    return "on trust" if is_trusted(key) else "passed"
 
 
-def _print(ended: dict[str, Counter[str]], let_by: dict[str, list[str]]) -> None:
-    kinds = "refused", "found", "no claim", "passed", "crashed"
+def _note(
+    ended: dict[str, Counter[str]],
+    let_by: dict[str, list[str]],
+    kind: str,
+    words: str,
+    how: str,
+) -> None:
+    ended[kind.split(".")[0]][how.split(":")[0]] += 1
+    if how not in ("refused", "found"):
+        let_by[kind].append(words)
+
+
+def _print(ended: dict[str, Counter[str]], let_by: dict[str, list[str]]) -> bool:
+    kinds = "refused", "found", "no claim", "on trust", "passed", "crashed"
     print(f"| section | {' | '.join(kinds)} |\n{(len(kinds) + 1) * '|---'}|")
     total = Counter[str]()
     for section, counts in ended.items():
         total += counts
         print(f"| {section} | {' | '.join(str(counts[kind]) for kind in kinds)} |")
     print(f"| all | {' | '.join(str(total[kind]) for kind in kinds)} |\n")
-    for path, edits in let_by.items():
-        print(f"{path}: {'; '.join(edits)}")
+    for kind, edits in let_by.items():
+        print(f"{kind}: {'; '.join(edits)}")
+    return bool(total["passed"] or total["crashed"])
 
 
 if __name__ == "__main__":

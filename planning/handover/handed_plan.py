@@ -13,6 +13,7 @@ from geometry.parallel import n_threads
 from planning.model.plan import RigPlan
 from planning.report.drawing.face_colours import face_status
 from planning.report.drawing.rig_picture import draw_rig
+from planning.report.made_again import again_or_why_not
 from planning.report.page.page import PAGE, page_of, write_page
 from planning.report.summary.shortfall import shortfalls
 from planning.verify.reconstruction.check.result import Reconstruction
@@ -65,7 +66,9 @@ class HandedPlan(RigPlan):
         threads: int | None = None,
     ) -> Verification:
         """Recompute every claim and check from pixels, as `verify_plan` does."""
-        return verify_plan(self, mesh, seed=seed, threads=threads)
+        return verify_plan(
+            self, mesh, seed=seed, threads=threads, again=again_or_why_not
+        )
 
     def reconstruct(
         self, *, seed: int | None = None, threads: int | None = None

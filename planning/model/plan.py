@@ -158,7 +158,9 @@ class RigPlan:
         Raises:
             PlanFileError: If a value is missing or can't be used.
         """
-        return cls(_document(json.dumps(document), "plan"), surface)
+        read = _document(json.dumps(document), "plan")
+        _check_references(read, surface, "plan")
+        return cls(read, surface)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -175,13 +177,7 @@ class RigPlan:
         document = _document(content, str(path))
         surface = document.surface
         loaded = Surface.load(path.parent / surface.path, surface.sha256)
-        for kind in ("projector", "camera"):
-            models, n = loaded.models_of(kind), len(document.rig.models(kind))
-            if not np.all((models >= 0) & (models < n)):
-                raise PlanFileError(
-                    f"{path}: reference_{kind}_models of {surface.path} names models "
-                    f"{models.min()} to {models.max()}, the rig has {n}; plan again"
-                )
+        _check_references(document, loaded, str(path))
         return cls(document, loaded, cls._members(path, document))
 
     @classmethod
@@ -233,6 +229,24 @@ def _document(text: str | bytes, where: str) -> PlanDocument:
     except ValueError as error:
         raise PlanFileError(f"{where}: broken plan ({error}); plan again") from None
     return document
+
+
+def _check_references(document: PlanDocument, surface: Surface, where: str) -> None:
+    """Refuse places that aren't in the rig, or among the reference poses."""
+    for kind in ("projector", "camera"):
+        models, n = surface.models_of(kind), len(document.rig.models(kind))
+        if not np.all((models >= 0) & (models < n)):
+            raise PlanFileError(
+                f"{where}: reference_{kind}_models of {document.surface.path} names "
+                f"models {models.min()} to {models.max()}, the rig has {n}; plan again"
+            )
+        for place, row in enumerate(document.marginal):
+            named = (row.reference or ()) if hasattr(row, f"n_{kind}s") else ()
+            if max(named, default=-1) >= len(models):
+                raise PlanFileError(
+                    f"{where}: marginal.{place}.reference names pose {max(named)}, "
+                    f"{document.surface.path} holds {len(models)}; plan again"
+                )
 
 
 def _faults(error: ValidationError) -> list[str]:

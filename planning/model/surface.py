@@ -101,6 +101,9 @@ class Surface:
     reference_camera_models: Ints | None = None
 
     def __post_init__(self) -> None:
+        # Others are as many as these: a lone number has no length to ask for.
+        for name in ("reference_projectors", "reference_cameras"):
+            _check_arrays({name: getattr(self, name)}, {})
         sizes: dict[int | str, int] = {
             "n faces": len(self.mesh.faces),
             "n projectors": len(self.reference_projectors),

@@ -6,8 +6,10 @@ from typing import Any
 from planning.cameras.baselines.baseline_rows import baseline_rows
 from planning.cameras.baselines.seams import SampledSurface
 from planning.model.document.certificates import Certificates
+from planning.model.document.coverage_records import CameraMarginal, ProjectorMarginal
 from planning.model.document.device_records import BaselineRow
 from planning.model.document.input_records import EvaluationRecord
+from planning.model.document.ring_records import RingsRecord
 from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
@@ -23,19 +25,14 @@ from planning.report.entries.station_entries import stations_record
 from planning.report.entries.surface_entry import surface_of
 from planning.report.entries.survival_entries import survival_record
 from planning.report.entries.violations import violations
-from planning.rings.ring_pitch import widest_gap
-from planning.scene.measured import widest_pixel
+from planning.rings.written_rings import evenly_ringed
 from planning.scene.scene import Scene
 
-from .claims import Claims, make_claims
+from .claims import Claims, make_claims, tau_m
 from .entries import device_entries as entries
 from .judged import Devices
-from .marginal import marginal_records
+from .marginal import marginal_records, of_numbers
 from .partial_plan import PartialPlan
-
-# A point must be found within a ring gap, or so many pixels of the panel: at steps and
-# borders a decoder leaves some out.
-_TAU_PIXELS = 4.0
 
 
 def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
@@ -47,7 +44,7 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
     scene = partial.scene
     with clock.stage("claims", "coverage, recomputed from the rounded poses"):
         claims = make_claims(scene, devices)
-        marginal = marginal_records(partial, devices, claims)
+        marginal = _marginal(partial, devices, claims)
         survival = survival_record(scene, devices, claims, partial.surviving)
     among = scene.among((*devices.projectors, *devices.cameras))
     coverage, certificates = claims.coverage, _certificates(partial)
@@ -69,7 +66,7 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
         requirements,
         coverage,
         regions,
-        entries.projector_records(among, devices, partial.rings, claims),
+        entries.projector_records(among, devices, _rings(partial), claims),
         entries.camera_records(among, devices.cameras, claims),
         marginal,
         certificates,
@@ -112,6 +109,33 @@ def _rounded_devices(partial: PartialPlan) -> Devices:
     )
 
 
+def _rings(partial: PartialPlan) -> tuple[RingsRecord, ...] | None:
+    return None if partial.rings is None else partial.rings.records
+
+
+def _marginal(
+    partial: PartialPlan, devices: Devices, claims: Claims
+) -> tuple[ProjectorMarginal | CameraMarginal, ...]:
+    stage, views = partial.stage, partial.camera_stage
+    numbers = (
+        of_numbers(
+            stage.by_count,
+            devices.projectors,
+            (stage.reference, devices.reference_projectors),
+            entries.rounded_projector,
+        ),
+        of_numbers(
+            views.by_count,
+            devices.cameras,
+            (views.reference, devices.reference_cameras),
+            entries.rounded_camera,
+        ),
+    )
+    rings = _rings(partial) or (None,) * len(devices.projectors)
+    evenly = tuple(map(evenly_ringed, devices.projectors, rings))
+    return marginal_records(partial.scene, devices, claims, numbers, evenly)
+
+
 def _final_requirements(scene: Scene, claims: Claims, devices: Devices) -> Requirements:
     """State tau and the reference sets as they are."""
     requirements = scene.requirements
@@ -120,13 +144,8 @@ def _final_requirements(scene: Scene, claims: Claims, devices: Devices) -> Requi
         n_reference_projectors=len(devices.reference_projectors),
         n_reference_cameras=len(devices.reference_cameras),
     )
-    nearest = (
-        widest_gap(scene, devices.projectors, claims.target_samples)
-        if requirements.pattern == "rings"
-        else _TAU_PIXELS
-        * widest_pixel(scene, devices.projectors, claims.target_samples)
-    )
-    check = replace(requirements.check, tau_m=round(nearest, 6))
+    nearest = tau_m(scene, devices.projectors, claims)
+    check = replace(requirements.check, tau_m=nearest)
     return replace(requirements, workspace=workspace, check=check)
 
 

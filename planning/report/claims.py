@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 from geometry.repair.hollow import lies_inside
 from planning.model.document.coverage_records import Areas, Coverage
+from planning.model.planned import PlannedProjector
+from planning.rings.ring_pitch import widest_gap
 from planning.scene.camera_views import view_of
 from planning.scene.draws import DRAWS
 from planning.scene.lighting import (
@@ -17,6 +19,7 @@ from planning.scene.lighting import (
 )
 from planning.scene.limits import camera_limits, projector_limits
 from planning.scene.limits.projector_limits import LIT
+from planning.scene.measured import widest_pixel
 from planning.scene.placed_bodies import Blocker, Device, Obstruction, blocked_by
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
@@ -27,6 +30,11 @@ from .region_claims import RegionClaim, RegionSamples, claim_regions
 
 _BETWEEN_LIGHT = projector_limits.BLOCKED, projector_limits.OBSTRUCTED
 _BETWEEN_VIEW = camera_limits.BLOCKED, camera_limits.OBSTRUCTED
+
+
+# A point must be found within a ring gap, or so many pixels of the panel: at steps and
+# borders a decoder leaves some out.
+_TAU_PIXELS = 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +103,16 @@ def make_claims(scene: Scene, devices: Devices) -> Claims:
         seen,
         region_samples,
     )
+
+
+def tau_m(
+    scene: Scene, projectors: Sequence[PlannedProjector], claims: Claims
+) -> float:
+    """Return within what distance of a sample the check must find a point [m]."""
+    samples = claims.target_samples
+    if scene.requirements.pattern == "rings":
+        return round(widest_gap(scene, projectors, samples), 6)
+    return round(_TAU_PIXELS * widest_pixel(scene, projectors, samples), 6)
 
 
 def _areas(judged: Judged) -> Areas:

@@ -62,6 +62,8 @@ class PlanRequest:
             of its file.
         evaluates: Whether these are all there will be.
         axis_wanted: Where ring axes stand after all; None: as was asked.
+        stated: What the user asked, where wishes were tightened for it; None: they
+            weren't.
         least_projectors: Projectors at least, though fewer light enough.
         family: The members, of which the mesh holds all; None: it is one mesh.
         cache: What was answered before.
@@ -80,6 +82,7 @@ class PlanRequest:
     mounted: Mounted | None = None
     evaluates: bool = False
     axis_wanted: RingAxis | None = None
+    stated: Wishes | None = None
     least_projectors: int = 0
     family: FamilyRequest | None = None
     cache: Cache = NO_CACHE

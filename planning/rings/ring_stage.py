@@ -57,11 +57,6 @@ class RingStage:
     kept_even: frozenset[int] = frozenset()
     records: tuple[RingsRecord, ...] = ()
 
-    @property
-    def even_radii(self) -> tuple[NDArray[np.float64], ...]:
-        """The radii of evenly spaced rings."""
-        return tuple(projector.ring_radii for projector in self.even)
-
     def on(self, scene: Scene) -> "RingStage":
         """Return the same rings, with what is to be said of them on one surface."""
         creases = _creases(scene)

@@ -25,6 +25,7 @@ def with_check(plan: RigPlan, verification: Verification, clock: Stopwatch) -> R
             failures=(*false, *record.failures),
             passed=record.passed and not false,
             plan=plan.digest,
+            asked=plan.document.coverage.asked,
         )
     greedy = plan.document.certificates.cameras.greedy_count
     (member,) = plan.document.members

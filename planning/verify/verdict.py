@@ -22,6 +22,9 @@ class Verification:
         reconstruction: The simulated one; None if it wasn't asked for.
         missed: Limits of the check that aren't kept, as the plan records itself.
         compared: How the recorded figures of the check were compared with these.
+        claims_held: How closely claims were held: to the last digit, or within
+            tolerances and why; "" where one is false anyway.
+        trusted: What was taken on trust, since nothing here recomputes it.
         members: Of a family each member's name, and what was found of it; the audit and
             the reconstruction are then the worst member's.
     """
@@ -32,6 +35,13 @@ class Verification:
     missed: tuple[str, ...] = ()
     members: tuple[tuple[str, "Verification"], ...] = ()
     compared: str = ""
+    claims_held: str = ""
+    trusted: tuple[str, ...] = ()
+
+    @property
+    def is_strict(self) -> bool:
+        """Whether every claim holds, and nothing was taken on trust."""
+        return self.passed and not self.trusted
 
     @property
     def passed(self) -> bool:
@@ -60,6 +70,8 @@ class Verification:
             "samples": len(self.audit.case.samples),
             "reconstruction": None if pixels is None else pixels.to_document(),
             "compared": self.compared,
+            "claims_held": self.claims_held,
+            "taken_on_trust": list(self.trusted),
             **({"members": named} if named else {}),
         }
 
@@ -77,11 +89,14 @@ class Verification:
             for name in ("target", "surface")
         ]
         lines.append(_pixels_line(self.reconstruction))
+        if self.claims_held:
+            lines.append(f"claims held {self.claims_held}")
         if self.compared:
             lines.append(f"recorded figures of the check compared {self.compared}")
         bounced = self.reconstruction and self.reconstruction.record().interreflection
         if bounced and bounced.warning():
             lines.append(f"warning: {bounced.warning()}")
+        lines += [f"taken on trust: {sentence}" for sentence in self.trusted]
         lines += [f"not met: {sentence}" for sentence in self.unmet]
         lines += [f"FALSE: {sentence}" for sentence in self.failures]
         checked = "pixels checked" if self.reconstruction is not None else "NOT CHECKED"

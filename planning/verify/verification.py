@@ -9,19 +9,13 @@ import numpy as np
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.parallel import abandonable, n_threads
-from planning.model.document.check_records import ReconstructionRecord
-from planning.model.document.made_with import MadeWith
 from planning.model.errors import InputError
 from planning.model.plan import RigPlan
 from planning.verify.audit.audit import audited
 from planning.verify.audit.audit_case import AuditCase, examine
 from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.coverage.prediction import possible_at_floors
-from planning.verify.audit.figure_claims import (
-    compare_exactly,
-    compare_figures,
-    contradictions,
-)
+from planning.verify.audit.figure_claims import contradictions
 from planning.verify.family import audit_family
 from planning.verify.mesh_comparison import comparable, compare_meshes
 from planning.verify.reconstruction.check.accuracy import Expected
@@ -38,6 +32,8 @@ from planning.verify.reconstruction.render.mitsuba.physics import Physics
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.scanner import Scanner
 
+from .held_figures import Again, hold_claims, hold_figures
+from .trust import taken_on_trust
 from .verdict import Verification
 
 
@@ -52,6 +48,7 @@ def verify_plan(
     seed: int | None = None,
     threads: int | None = None,
     progress: Callable[[str], None] | None = None,
+    again: Again | None = None,
 ) -> Verification:
     """Recompute every claim of a plan, then measure its object through pixels.
 
@@ -69,6 +66,9 @@ def verify_plan(
         seed: Of the audit's samples and the pixel noise; the plan's own by default.
         threads: Worker threads; no result depends on them. None: all cores.
         progress: Receives a line when a stage begins.
+        again: Computes claims again by the code that made them, so that they are held
+            to the last digit where nothing of what made the plan is different; None:
+            they are held by the audit alone.
 
     Raises:
         InputError: If `truth` can't be rendered for the plan.
@@ -93,6 +93,7 @@ def verify_plan(
             photometry=photometry,
             seed=seed,
             threads=threads,
+            again=again,
         )
     if truth is not None and truth.cameras_alone != plan.cameras_alone:
         raise InputError(
@@ -110,58 +111,48 @@ def verify_plan(
             other = mesh
     recorded = plan.document.reconstruction
     differs += contradictions(recorded, plan.requirements.check, plan.digest)
-    if not check_pixels:
-        audit = audited(case)
-        return Verification((*audit.failures, *differs), audit, None)
     how = {"photometry": photometry, "physics": physics}
+    pixels = None
     # Pixels need what was recomputed, and no claim.
     with abandonable(1) as pool:
         auditing = pool.submit(audited, case)
         try:
-            pixels = _reconstruct(plan, case, truth, other, seed, threads, say, how)
+            if check_pixels:
+                pixels = _reconstruct(plan, case, truth, other, seed, threads, say, how)
         except Exception:
             # Of a plan without meaning that is said, and not how it can't be rendered.
             auditing.result()
             raise
         audit = auditing.result()
+    held = "", ""
     failures = [*audit.failures, *differs]
-    if truth is not None or other is not None or any(how.values()):
+    if not failures:
+        if again is not None:
+            say("claims: computed again by the code that made them")
+        again_false, how_claims = hold_claims(plan, again, threads)
+        failures += again_false
+        held = how_claims, ""
+    missed: tuple[str, ...] = ()
+    as_planned = truth is None and other is None and not any(how.values())
+    if pixels is not None and not as_planned:
         # What is recorded is of the rig as planned, by the built-in renderer.
-        return Verification((*failures, *pixels.failures), audit, pixels)
-    false, compared = hold_figures(plan, pixels.record(), seed)
-    if recorded is not None and not recorded.passed and not false:
-        failures, missed = tuple(failures), pixels.failures
-    else:
-        failures, missed = (*failures, *pixels.failures, *false), ()
-    return Verification(failures, audit, pixels, missed, compared=compared)
-
-
-def hold_figures(
-    plan: RigPlan, fresh: ReconstructionRecord, seed: int
-) -> tuple[list[str], str]:
-    """Return which recorded figures a check again gives otherwise, and how it was held.
-
-    To the last digit where nothing of what made the plan is different, and the seed of
-    the check again is the plan's.
-    """
-    recorded = plan.document.reconstruction
-    if recorded is None:
-        return [], ""
-    false = compare_figures(recorded, fresh)
-    if apart := _made_apart(plan, seed):
-        return false, f"within tolerances: {apart}"
-    return false + compare_exactly(recorded, fresh), "to the last digit"
-
-
-def _made_apart(plan: RigPlan, seed: int) -> str:
-    """Why the check needn't give the same figures again; "": nothing is different."""
-    if seed != plan.document.seed:
-        return f"made with seed {plan.document.seed}, here {seed}"
-    made = plan.document.made_with
-    if made is None:
-        return "the plan doesn't say what it was made with"
-    differs = made.differs(MadeWith.here())
-    return f"made with {differs}" if differs else ""
+        failures += pixels.failures
+    elif pixels is not None:
+        false, how_figures = hold_figures(plan, pixels.record(), seed)
+        held = held[0], how_figures
+        if recorded is not None and not recorded.passed and not false:
+            missed = pixels.failures
+        else:
+            failures += (*pixels.failures, *false)
+    return Verification(
+        tuple(failures),
+        audit,
+        pixels,
+        missed,
+        claims_held=held[0],
+        compared=held[1],
+        trusted=taken_on_trust(plan, mesh, *held),
+    )
 
 
 def _verify_family(
@@ -187,6 +178,7 @@ def _verify_family(
         ),
         worst.reconstruction,
         members=tuple(found),
+        trusted=tuple(f"{n}: {line}" for n, one in found for line in one.trusted),
     )
 
 

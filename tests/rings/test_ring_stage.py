@@ -239,7 +239,7 @@ def test_rings_that_miss_the_ball_are_left_out(bench):
     assert inner - margin - gap <= shown[0] <= inner - margin + 0.3 * gap
     assert outer + margin - 0.3 * gap <= shown[-1] <= outer + margin + gap
     assert len(left_out) >= 2
-    assert np.array_equal(stage.even_radii[0], radii)
+    assert np.array_equal(stage.even[0].ring_radii, radii)
 
 
 def test_kept_rings_and_a_beam_that_misses_leave_nothing_out():

@@ -51,6 +51,11 @@ _SECTIONS = {
 @click.option(
     "--seed", type=click.IntRange(0), help="Of the audit [default: the plan's]."
 )
+@click.option(
+    "--strict",
+    is_flag=True,
+    help="Exit 1 if anything is taken on trust, too: what that is, is always told.",
+)
 @rendering_options
 @threads_option
 @output_options

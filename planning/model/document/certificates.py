@@ -144,7 +144,9 @@ class Certificates(Part):
 
     Attributes:
         projectors: None: the pattern `none` has no projector.
+        asked: As of `coverage`.
     """
 
     projectors: Certificate | None = None
     cameras: Certificate
+    asked: str | None = None

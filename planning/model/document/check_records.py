@@ -100,6 +100,7 @@ class ReconstructionRecord(Part):
             or a point that merging took for a step between surfaces.
         beyond_1mm_fraction: Share of the merged points that are off by more.
         plan: Digest of the plan that was checked (`RigPlan.digest`).
+        asked: As of `coverage`.
     """
 
     n_points: int
@@ -123,3 +124,4 @@ class ReconstructionRecord(Part):
     passed: bool
     failures: tuple[str, ...]
     plan: str | None = None
+    asked: str | None = None

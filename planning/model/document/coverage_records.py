@@ -1,10 +1,13 @@
 """`coverage`, `regions`, `marginal`, `overlaps` and `firing_schedule`."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from .part import Part, Vector3
+
+# Of a reference pose.
+Place = Annotated[int, Field(ge=0)]
 
 
 class Areas(Part):
@@ -72,6 +75,7 @@ class Coverage(Part):
         relaxations: What would let projectors reach enough.
         unmeasurable_by_cause: Lit target area that no reference camera measures.
         camera_relaxations: What would let cameras reach enough.
+        asked: Digest of what was asked of the plan, `asked_digest`.
     """
 
     samples: int
@@ -86,6 +90,7 @@ class Coverage(Part):
     relaxations: tuple[Relaxation, ...] = ()
     unmeasurable_by_cause: dict[str, float] = Field(default={})
     camera_relaxations: tuple[Relaxation, ...] = ()
+    asked: str | None = None
 
 
 class RobustRecord(Part):
@@ -165,6 +170,8 @@ class ProjectorMarginal(Part):
         worst_region: Large region of which they light the least share of what can be
             reached; None: there is none, or the plan is from before.
         worst_region_lit: That share.
+        reference: Places of the projectors among the reference poses of `surface.npz`;
+            absent where they are the plan's, or stand at none of these poses.
     """
 
     n_projectors: int
@@ -172,14 +179,20 @@ class ProjectorMarginal(Part):
     lit_surface_m2: float
     worst_region: int | None = None
     worst_region_lit: float | None = None
+    reference: tuple[Place, ...] | None = None
 
 
 class CameraMarginal(Part):
-    """Areas with so many cameras and all projectors of the plan [m²]."""
+    """Areas with so many cameras and all projectors of the plan [m²].
+
+    Attributes:
+        reference: As of projectors.
+    """
 
     n_cameras: int
     measured_target_m2: float
     measured_surface_m2: float
+    reference: tuple[Place, ...] | None = None
 
 
 class Overlap(Part):

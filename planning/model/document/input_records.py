@@ -28,8 +28,8 @@ Limit = Literal[
 class Units(Part):
     """Of every figure that doesn't name its own."""
 
-    length: str
-    angle: str
+    length: Literal["m"]
+    angle: Literal["rad"]
 
 
 class Repair(Part):
@@ -140,6 +140,12 @@ class ModelRecord(Part):
     light: str = ""
     count: int | None = None
     cost: float | None = None
+
+    @model_validator(mode="after")
+    def _images_by_one_law(self) -> Self:
+        if self.K is not None and (self.pixel_pitch_m or self.beam_radius):
+            raise ValueError("K excludes pixel_pitch_m and beam_radius: write one")
+        return self
 
     @property
     def optics(self) -> PinholeModel | ParallelModel:

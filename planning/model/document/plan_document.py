@@ -31,6 +31,7 @@ from .input_records import (
 from .joint_records import JointRecord
 from .made_with import MadeWith
 from .part import Part
+from .request_records import RequestRecord
 from .ring_records import RingAxes
 from .station_records import StationsRecord
 from .survival_records import SurvivalRecord
@@ -91,13 +92,14 @@ class PlanDocument(Part):
     """A plan as it is written; metres, radians, and pixels where named.
 
     Attributes:
+        request: None: the plan is from before.
         assumed: What the object or its surroundings must have, and no claim shows.
     """
 
     format: Literal["ringrig-plan"]
     version: Literal[1]
     units: Units
-    seed: int
+    seed: Annotated[int, Field(ge=0)]
     created: str
     made_with: MadeWith | None = None
     command: tuple[str, ...]
@@ -105,6 +107,7 @@ class PlanDocument(Part):
     meshes: Annotated[tuple[MeshRecord, ...], Field(min_length=1)]
     surface: SurfaceRecord
     rig: RigRecord
+    request: RequestRecord | None = None
     requirements: Requirements
     regions: tuple[RegionRecord, ...]
     projectors: tuple[ProjectorRecord, ...]

@@ -27,14 +27,19 @@ from planning.model.document.input_records import (
     SurfaceRecord,
 )
 from planning.model.document.part import Vector3
-from planning.model.document.ring_records import OtherAxes, OtherRings, RingAxes
+from planning.model.document.ring_records import (
+    OtherAxes,
+    OtherRings,
+    RingAxes,
+    RingsRecord,
+)
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.surface import Surface
 from planning.report.claims import Claims
 from planning.report.judged import Devices
 from planning.report.partial_plan import PartialPlan, Prepared
 from planning.rings.ring_shares import ring_shares
-from planning.rings.ring_stage import RingStage
+from planning.rings.written_rings import told_again
 from planning.scene.interest import Interest
 from planning.scene.measured import lit_samples, measured_by
 from planning.scene.placed_bodies import Device
@@ -81,7 +86,10 @@ def rounded_camera(camera: PlannedCamera, name: str) -> PlannedCamera:
 
 
 def projector_records(
-    scene: Scene, devices: Devices, rings: RingStage | None, claims: Claims
+    scene: Scene,
+    devices: Devices,
+    rings: Sequence[RingsRecord] | None,
+    claims: Claims,
 ) -> tuple[ProjectorRecord, ...]:
     """Return the plan's `projectors`; no `rings` where the run was cut before them."""
     exposed = exposure_records(scene, devices, claims)
@@ -92,7 +100,7 @@ def projector_records(
             lit_area_m2=claims.lit_area_m2[p],
         ).changed(
             **_mounted(scene.requirements.workspace.projector_mount, projector),
-            rings=None if rings is None else rings.records[p],
+            rings=None if rings is None else told_again(scene, projector, rings[p]),
             **_shares(scene, projector, devices),
             **exposed[p],
         )
@@ -122,8 +130,6 @@ def axes_record(
     if partial.other_axes:
         pairs = zip(partial.other_axes, devices.projectors, strict=True)
         turned = [rounded_projector(p, planned.id) for p, planned in pairs]
-        samples = lit_samples(scene, turned, claims.target_samples)
-        measured = measured_by(scene, devices.cameras, samples).any(axis=1)
         other = OtherAxes(
             axis="free" if partial.axes == "centred" else "centred",
             projectors=tuple(
@@ -134,10 +140,22 @@ def axes_record(
                 )
                 for p in turned
             ),
-            measured_m2=claims.target_samples.samples.weight * int(measured.sum()),
+            measured_m2=measured_with(scene, turned, devices.cameras, claims),
         )
     asked = request.wishes.ring_axis or request.rig.rings.axis
     return RingAxes(asked=asked, taken=partial.axes, other=other)
+
+
+def measured_with(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    cameras: Sequence[PlannedCamera],
+    claims: Claims,
+) -> float:
+    """Return what cameras measure of the target with other projectors [m²]."""
+    samples = lit_samples(scene, projectors, claims.target_samples)
+    measured = measured_by(scene, cameras, samples).any(axis=1)
+    return claims.target_samples.samples.weight * int(measured.sum())
 
 
 def camera_records(

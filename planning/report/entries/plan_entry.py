@@ -32,6 +32,7 @@ from planning.report.partial_plan import Prepared
 
 from . import device_entries as entries
 from .cost_entry import cost_record
+from .request_entry import request_record, signed
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +62,7 @@ def document_of(
     """Return the document of a plan that isn't checked; `others` are more of it."""
     request, scene = ready.request, ready.scene
     rig = RigRecord(**request.rig.to_document())
-    return PlanDocument(
+    document = PlanDocument(
         format=FORMAT,
         version=VERSION,
         units=Units(length="m", angle="rad"),
@@ -73,6 +74,7 @@ def document_of(
         meshes=(entries.mesh_record(scene.mesh, scene.shell),),
         surface=entries.surface_record(ready, surface),
         rig=rig,
+        request=request_record(request),
         requirements=told.requirements,
         regions=told.regions,
         projectors=told.projectors,
@@ -104,3 +106,4 @@ def document_of(
         timings_s=dict(clock.seconds),
         **others,  # type: ignore[arg-type]
     )
+    return signed(document)

@@ -1,6 +1,5 @@
 """A plan's claims, recomputed for devices that stand elsewhere."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeVar
@@ -15,18 +14,16 @@ from planning.model.calibration_errors import (
     CalibrationErrors,
     Mounting,
 )
-from planning.model.device_poses import moved_to
-from planning.model.document.input_records import ModelRecord
 from planning.model.plan import RigPlan
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.report.judged import Devices, Judged
+from planning.report.judged import Judged
+from planning.report.written_plan import written_devices, written_scene
 from planning.scene.camera_views import camera_views
 from planning.scene.draws import DRAWS
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.measurability import pair_quality
 from planning.scene.measured import LitSamples, Pair, pairs_of
-from planning.scene.placed_bodies import Obstruction
 from planning.scene.samples import Target, merged
 from planning.scene.scene import Scene
 
@@ -107,7 +104,7 @@ class BuiltCase:
         n_target = len(target)
         if (more := scene.more_of_regions(target, DRAWS.region_claims)) is not None:
             target = merged(target, more)
-        devices = _devices(plan)
+        devices = written_devices(plan)
         judged = Judged.of(scene, devices, target)
         rig = Rig(devices.projectors, devices.cameras)
         if calibration is None:
@@ -251,57 +248,9 @@ class BuiltCase:
 
 
 def scene_of(plan: RigPlan, *, threads: int) -> Scene:
-    """Return what a plan's claims were computed on."""
-    surface = plan.surface
-    return Scene(
-        surface.mesh,
-        surface.region,
-        surface.steep,
-        as_asked(plan.requirements),
-        plan.document.seed,
-        threads,
-        obstructions=Obstruction.about(surface.mesh, surface.obstacles, threads),
-    )
-
-
-def _devices(plan: RigPlan) -> Devices:
-    """A plan's devices, and what stands at its reference poses."""
-    surface, workspace = plan.surface, plan.requirements.workspace
-    rig, widest = plan.document.rig, np.array([workspace.reference_ring_radius])
-    lit = _templates(plan.projectors, rig.models("projector"))
-    views = _templates(plan.cameras, rig.models("camera"))
-    poses = zip(
-        surface.reference_projectors,
-        surface.reference_rings,
-        surface.models_of("projector"),
-        strict=True,
-    )
-    cameras = zip(surface.reference_cameras, surface.models_of("camera"), strict=True)
-    return Devices(
-        plan.projectors,
-        plan.cameras,
-        tuple(
-            replace(
-                lit[model],
-                world_from_device=pose,
-                world_from_ring=ring,
-                ring_radii=widest,
-            )
-            for pose, ring, model in poses
-        ),
-        tuple(moved_to(views[model], pose) for pose, model in cameras),
-    )
-
-
-def _templates(devices: Sequence[_D], models: Sequence[ModelRecord]) -> list[_D]:
-    """A device of each model that stands nowhere; the plan may hold none of it."""
-    like = replace(devices[0], existing="")
-    if len(models) == 1:
-        return [like]
-    return [
-        replace(like, device=model.optics, body=model.body, model=model.name)
-        for model in models
-    ]
+    """Return what a plan's claims were computed on, as it was asked for."""
+    scene = written_scene(plan, threads=threads)
+    return scene.asking(as_asked(plan.requirements))
 
 
 def _share(part: _Mask, whole: _Mask) -> float:

@@ -27,6 +27,7 @@ from planning.model.progress import TIME_IS_UP, Stopwatch
 from planning.model.requirements import Requirements
 from planning.proofs.candidate_certificate import larger
 from planning.report.assemble import write_plan
+from planning.report.entries.request_entry import signed
 from planning.report.partial_plan import PartialPlan, PlanRequest
 from planning.rig.wishes import Wishes
 
@@ -112,7 +113,11 @@ def robustly(planned: Planned) -> Planned:
                 aim = _aimed(aim, short, rounds[-1])
                 wishes = _tightened(rounds[-1], short, request.wishes)
                 if wishes != request.wishes:
-                    request, more = replace(request, wishes=wishes), None
+                    stated = request.stated or request.wishes
+                    request, more = (
+                        replace(request, wishes=wishes, stated=stated),
+                        None,
+                    )
                 else:
                     many = _many(request, rounds)
                     more = surer(latest[1], replace(aim, most=many), clock)
@@ -174,7 +179,8 @@ def _cut(plan: RigPlan) -> RigPlan:
 
 def _with(plan: RigPlan, robust: Robust) -> RigPlan:
     requirements = replace(plan.requirements, robust=robust)
-    return RigPlan(plan.document.changed(requirements=requirements), plan.surface)
+    document = signed(plan.document.changed(requirements=requirements))
+    return RigPlan(document, plan.surface)
 
 
 def _drawn(

@@ -12,6 +12,7 @@ from planning.verify.audit.counts.certificate_claims import (
 )
 from planning.verify.audit.counts.cost_claims import audit_cost
 from planning.verify.audit.counts.joint_claims import audit_joint
+from planning.verify.audit.counts.marginal_claims import audit_marginal
 from planning.verify.audit.counts.overlap_claims import (
     audit_groups,
     audit_overlaps,
@@ -51,6 +52,7 @@ from planning.verify.audit.stations.station_claims import audit_stations
 
 from .audit_case import N_SAMPLES, AuditCase, examine
 from .audit_findings import AuditFindings
+from .request_claims import audit_request
 
 _CLAIMS = (
     audit_devices,
@@ -76,6 +78,7 @@ _CLAIMS = (
     audit_regions,
     audit_floors,
     audit_tables,
+    audit_marginal,
     audit_shares,
     audit_certificates,
     audit_joint,
@@ -86,6 +89,7 @@ _CLAIMS = (
     audit_rings,
     audit_ring_axes,
     audit_limits,
+    audit_request,
     audit_scales,
     audit_cost,
 )
@@ -113,6 +117,7 @@ _CLAIMS_OF_VIEWS = (
     audit_baselines,
     audit_groups,
     audit_limits,
+    audit_request,
     audit_scales,
     audit_cost,
 )
@@ -169,6 +174,22 @@ def audited(case: AuditCase) -> Audit:
     for audit_claims in _CLAIMS_OF_VIEWS if alone else _CLAIMS:
         audit_claims(case, findings)
     return Audit(findings.failures, _unmet_requirements(plan), case)
+
+
+def first_false(case: AuditCase, *, quick: bool = False) -> tuple[str, ...]:
+    """Return what the first audit that finds anything finds, the quick ones first.
+
+    Or those alone. For who only asks whether a plan with projectors holds.
+    """
+    slow = audit_inside, audit_floors, audit_rings, audit_marginal, audit_ring_axes
+    for audit_claims in sorted(_CLAIMS, key=lambda claims: claims in slow):
+        if quick and audit_claims in slow:
+            break
+        findings = AuditFindings()
+        audit_claims(case, findings)
+        if findings.failures:
+            return findings.failures
+    return ()
 
 
 def _unmet_requirements(plan: RigPlan) -> tuple[str, ...]:

@@ -74,9 +74,9 @@ class AuditFindings:
         tolerance: float = 0.0,
     ) -> bool:
         """Note a false claim unless it is its source: numbers within a tolerance."""
-        expected = np.asarray(truth).tolist()
-        if claimed is None or truth is None or isinstance(truth, str):
-            agrees = claimed == expected
+        expected = _plain(truth)
+        if claimed is None or truth is None or not _are_numbers(claimed, truth):
+            agrees = _plain(claimed) == expected
         else:
             agrees = np.shape(claimed) == np.shape(truth) and np.allclose(
                 claimed, truth, rtol=0.0, atol=tolerance
@@ -98,6 +98,22 @@ class AuditFindings:
 
     def _below(self, key: str) -> str:
         return ".".join(filter(None, (self._within, key)))
+
+
+def _plain(value: object) -> object:
+    """Return an array or a tuple as lists, and anything else as it is."""
+    try:
+        return np.asarray(value).tolist()
+    except ValueError:
+        return value
+
+
+def _are_numbers(*values: object) -> bool:
+    """Return whether all are numbers, or arrays of them; rig tables hold anything."""
+    try:
+        return all(np.asarray(value).dtype.kind in "biuf" for value in values)
+    except ValueError:
+        return False
 
 
 def square_centimetres(area_m2: float) -> str:

@@ -23,7 +23,7 @@ _REPEATABLE = {
 }
 _FRACTION_SLACK = 0.025
 # What isn't a figure of the check: how it ended, and of which plan it was.
-_VERDICT = re.compile("passed|failures([.].*)?|plan")
+_VERDICT = re.compile("passed|failures([.].*)?|plan|asked")
 # So many figures that differ are told.
 _MOST_TOLD = 8
 # Errors of parts of the surface are those of few points, and not compared.

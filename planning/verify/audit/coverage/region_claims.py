@@ -104,6 +104,12 @@ def _audit_selection(case: AuditCase, findings: AuditFindings) -> None:
     if selection is None:
         return
     _audit_faces(selection, surface, surface.region >= 0, findings)
+    own = selection.source, selection.sha256, selection.n_removed_by_repair
+    findings.holds(
+        selection.kind != "curvature" or own == (None, None, 0),
+        "source",
+        f"{own} is told of faces that were chosen by curvature, of no file",
+    )
     findings.holds(
         selection.kind in _SELECTIONS,
         "kind",

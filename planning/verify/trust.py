@@ -1,0 +1,178 @@
+"""What of a plan nobody can recompute from its files: no claims, and taken on trust.
+
+Keys are dotted, `*` stands for any name or number; a key stands for all below it.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from fnmatch import fnmatchcase
+from typing import Any
+
+from geometry.mesh.mesh import TriangleMesh
+from planning.model.document.coverage_records import CameraMarginal, ProjectorMarginal
+from planning.model.plan import RigPlan
+
+from .held_figures import EXACTLY
+
+# What no reader of a plan relies on: it says how the plan came about, or advises.
+NO_CLAIM = {
+    "created": "when the plan was made",
+    "command": "how it was asked for, in the user's words",
+    "timings_s": "wall time of that run",
+    "cost.t4": "processor time of that run; C holds it, and must be its sum",
+    "cost.t5": "as t4",
+    "cost.t2": "as t4, a pixel",
+    "cost.t3": "as t4",
+    "cost.C": "a sum of times; that it is their sum is a claim, and audited",
+    "cost.C_before": "as C",
+    "cost.C_all_rings": "as C",
+    "cost.render_s": "processor time of that check",
+    "meshes.*.path": "where the file lay",
+    "surface.selection.source": "where the file with the faces lay",
+    "rig.name": "words of the rig file's author",
+    "rig.description": "as rig.name",
+    "rig.notes": "as rig.name",
+    "rig.*.name": "what a device is called; of which model one is, is a claim",
+    "rig.*.sources": "where the author has a figure from, in words",
+    "rig.calibration.description": "as rig.name",
+    "coverage.relaxations": "advice",
+    "coverage.camera_relaxations": "advice",
+    "regions.*.coverage.relaxations": "advice",
+    "certificates.*.needed.relaxations": "advice",
+    "certificates.*.needed.wider_field": "advice",
+    "certificates.*.routes.why": "advice, in words",
+}
+
+
+def is_under(key: str, patterns: Mapping[str, str]) -> bool:
+    """Return whether a key is one of the patterns, or below one."""
+    parts = key.split(".")
+    return any(
+        fnmatchcase(".".join(parts[:n]), pattern)
+        for pattern in patterns
+        for n in range(1, len(parts) + 1)
+    )
+
+
+# Claims that the audit holds against others, but doesn't recompute; by what they say.
+ON_TRUST = {
+    "bounds on the numbers of devices, and what other numbers cover at most": (
+        "certificates.*.candidates",
+        "certificates.*.continuous",
+        "certificates.*.needed",
+        "certificates.*.by_count",
+        "certificates.*.best_area",
+        "certificates.*.one_fewer",
+        "certificates.*.greedy_count",
+        "certificates.*.but_for_bodies",
+        "certificates.*.bounds_leave_out",
+        "certificates.*.excluded_pairs",
+        "certificates.*.n_samples",
+        "certificates.*.n_regions",
+        "certificates.*.status",
+        "certificates.*.alone",
+        "certificates.*.routes",
+    ),
+    "how the rig's optics follow from its figures, and how many poses it offered": (
+        "rig.projector.figures",
+        "rig.camera.figures",
+        "rig.more_*.figures",
+        "rig.projector.distortion",
+        "rig.n_candidate_*",
+    ),
+    "that the run was, or wasn't, cut": ("truncated",),
+    "the numbers that survival takes": ("survival.projectors", "survival.cameras"),
+    "what planning both kinds together saved": ("joint",),
+    "numbers of heads or steps, and their bounds": ("stations.n_*", "stations.bound"),
+    "rigs drawn of the plan that isn't robust": (
+        "robust.n_*_without",
+        "robust.missed_by_without",
+        "robust.rounds",
+    ),
+    "what a family's members take alone": ("family.projectors", "family.cameras"),
+}
+# Of the mesh file, which isn't part of the plan.
+_OF_FILE = "the mesh file, its digest, size and repairs (meshes): give --mesh {path}"
+
+
+def is_trusted(key: str) -> bool:
+    """Return whether a claim is among those that are held against others alone.
+
+    What the plan was made with decides how closely figures are held, and the mesh file
+    is looked at where it is given: verify tells of either.
+    """
+    files = ("sha256", "unit", "scale_to_m", "n_vertices", "n_faces", "repairs")
+    own = ("made_with", *(f"meshes.*.{name}" for name in files))
+    patterns = (*(p for parts in ON_TRUST.values() for p in parts), *own)
+    return is_under(key, dict.fromkeys(patterns, ""))
+
+
+def taken_on_trust(
+    plan: RigPlan,
+    mesh: TriangleMesh | None,
+    claims_held: str,
+    figures_held: str,
+) -> tuple[str, ...]:
+    """Return what was believed of a plan, a line each; () where nothing was.
+
+    Args:
+        plan: The plan.
+        mesh: What its surface was compared with; None: with nothing.
+        claims_held: How closely its claims were held, "" where they weren't again.
+        figures_held: The same of the figures of its check.
+    """
+    keys = list(_keys(plan.to_document()))
+    lines: list[str] = []
+    for what, patterns in ON_TRUST.items():
+        named = dict.fromkeys(patterns, what)
+        if any(is_under(key, named) for key in keys):
+            lines.append(what)
+    for what, held in (("claims", claims_held), ("figures of the check", figures_held)):
+        if held != EXACTLY:
+            lines.append(f"the last digits of {what}: {held or 'not compared'}")
+    unnamed = [
+        place
+        for place, row in enumerate(plan.document.marginal)
+        if row.reference is None and _number_of(row) not in _planned(plan)
+    ]
+    if unnamed:
+        lines.append(
+            f"marginal, rows {', '.join(map(str, unnamed))}: the file doesn't say "
+            f"where those devices stand"
+        )
+    if plan.document.request is None:
+        lines.append("what was asked: the plan has no request beside its requirements")
+    record = plan.document.meshes[0]
+    if mesh is None:
+        path = record.path or "FILE"
+        lines.append(_OF_FILE.format(path=path))
+    elif mesh.source is None or mesh.source.sha256 != record.sha256:
+        lines.append(
+            "the mesh file that was planned (meshes): the one given has the same shape "
+            "and other bytes"
+        )
+    return tuple(lines)
+
+
+def _planned(plan: RigPlan) -> set[tuple[str, int]]:
+    return {
+        ("n_projectors", len(plan.projectors)),
+        ("n_cameras", len(plan.cameras)),
+    }
+
+
+def _number_of(row: ProjectorMarginal | CameraMarginal) -> tuple[str, int]:
+    name = "n_projectors" if isinstance(row, ProjectorMarginal) else "n_cameras"
+    return name, getattr(row, name)
+
+
+def _keys(value: Any, key: str = "") -> Iterator[str]:  # noqa: ANN401
+    """Yield the dotted keys of all that a document holds but nulls."""
+    parts: Iterable[tuple[Any, Any]] = ()
+    if isinstance(value, Mapping):
+        parts = value.items()
+    elif isinstance(value, list):
+        parts = enumerate(value)
+    elif value is not None:
+        yield key
+    for name, part in parts:
+        yield from _keys(part, f"{key}.{name}" if key else str(name))

@@ -1,0 +1,222 @@
+"""Claims to the last digit, what was asked beside what was used, what is believed."""
+
+import json
+from dataclasses import replace
+
+import pytest
+from click.testing import CliRunner
+from support.small_job import run
+
+from planning.cli.main import commands
+from planning.cli.other_commands import write_sample
+from planning.model.document.made_with import MadeWith
+from planning.model.document.request_records import asked_digest
+from planning.model.errors import PlanFileError
+from planning.model.plan import RigPlan
+from planning.report.made_again import again_or_why_not
+from planning.verify.held_figures import EXACTLY
+from planning.verify.trust import is_trusted, is_under
+from planning.verify.verification import verify_plan
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("held")
+    write_sample(folder / "head.obj", n_faces=900)
+    assert run(folder / "head.obj", folder).plan is not None
+    return folder
+
+
+@pytest.fixture(scope="module")
+def plan(folder):
+    return RigPlan.load(folder / "plan" / "plan.json")
+
+
+def forged(plan, change):
+    """A changed copy whose digests are made anew."""
+    document = plan.to_document()
+    change(document)
+    read = RigPlan.from_document(document, plan.surface).document
+    digest = asked_digest(read.request, read.requirements, read.rig)
+    for part in (document["coverage"], document["certificates"]):
+        part["asked"] = digest
+    document["members"][0]["coverage"] = document["coverage"]
+    return RigPlan.from_document(document, plan.surface)
+
+
+def found(plan, again=again_or_why_not, **how):
+    return verify_plan(plan, check_pixels=False, again=again, threads=1, **how)
+
+
+def test_claims_come_out_again_to_the_last_digit(plan):
+    honest = found(plan)
+    assert honest.failures == ()
+    assert honest.claims_held == EXACTLY
+    assert f"claims held {EXACTLY}" in honest.summary()
+
+
+@pytest.mark.parametrize(
+    ("place", "key"),
+    [
+        (("coverage", "target", "lit_m2"), "coverage.target.lit_m2"),
+        (("regions", 0, "mean_curvedness"), "regions.0.mean_curvedness"),
+        (("projectors", 0, "rings", "gap_m", 0), "projectors.0.rings.gap_m.0"),
+        (("projectors", 0, "ring_shares", "measured", 9), "ring_shares.measured.9"),
+        (("marginal", 0, "lit_target_m2"), "marginal.0.lit_target_m2"),
+        (("meshes", 0, "shell", "mean_wall_m"), "meshes.0.shell.mean_wall_m"),
+    ],
+)
+def test_a_billionth_shows_where_the_audit_alone_cannot_tell(plan, place, key):
+    def nudge(document):
+        for name in place[:-1]:
+            document = document[name]
+        document[place[-1]] *= 1.0 + 1e-9
+
+    edited = forged(plan, nudge)
+    alone = found(edited, again=None)
+    assert alone.failures == ()
+    assert "weren't computed again" in alone.claims_held
+    (failure,) = found(edited).failures
+    assert failure.split(":")[0].endswith(key)
+    assert "the same computation again gives" in failure
+
+
+def test_made_with_something_else_claims_are_held_within_tolerances(plan):
+    made = MadeWith.here().to_document()
+    made["libraries"]["numpy"] = "1.0"
+
+    def elsewhere(document):
+        document["made_with"] = made
+        document["coverage"]["target"]["lit_m2"] *= 1.0 + 1e-9
+
+    other = found(forged(plan, elsewhere))
+    assert other.failures == ()
+    assert other.claims_held.startswith("within tolerances: made with numpy 1.0")
+    assert any("last digits of claims" in line for line in other.trusted)
+
+
+def test_marginal_rows_are_those_of_the_poses_they_name(plan):
+    def other_poses(document):
+        row = document["marginal"][0]
+        row["reference"] = [(row["reference"][0] + 7) % 300]
+        row["lit_target_m2"] *= 0.5
+
+    assert any(
+        line.startswith("marginal.projectors.1")
+        for line in found(forged(plan, other_poses), again=None).failures
+    )
+
+    def nowhere(document):
+        document["marginal"][0]["reference"] = [100_000]
+
+    with pytest.raises(
+        PlanFileError, match=r"marginal\.0\.reference names pose 100000"
+    ):
+        forged(plan, nowhere)
+
+
+def test_a_row_of_more_devices_follows_the_one_it_adds_to(plan):
+    def later(document):
+        rows = [row for row in document["marginal"] if "n_cameras" in row]
+        rows[-1]["n_cameras"] += 1
+
+    (failure,) = (
+        line
+        for line in found(forged(plan, later), again=None).failures
+        if "stands before it" in line
+    )
+    assert failure.startswith("marginal.cameras.")
+
+
+@pytest.mark.parametrize("value", [{"x": 1}, "much", [[1.0], 2.0], True])
+def test_a_rig_table_that_holds_anything_is_told_and_never_crashes(plan, value):
+    def change(document):
+        document["rig"]["workspace"]["up"] = value
+        document["rig"]["rings"]["axis"] = value
+
+    failures = found(forged(plan, change), again=None).failures
+    assert any(line.startswith("request.up: claimed 'z'") for line in failures)
+
+
+def test_what_is_loosened_afterwards_is_named_with_its_pair(plan):
+    def used(document):
+        document["requirements"]["coverage"] = 0.5
+
+    assert (
+        "requirements.coverage: claimed 0.5, but request.coverage is 0.95"
+        in found(forged(plan, used), again=None).failures
+    )
+
+    def asked_too(document):
+        used(document)
+        document["request"]["coverage"] = 0.5
+
+    failures = found(forged(plan, asked_too), again=None).failures
+    assert (
+        "request.coverage: claimed 0.5, but rig.requirements.coverage is 0.95"
+        in failures
+    )
+    assert not any(line.startswith("requirements.coverage") for line in failures)
+
+    def check(document):
+        document["requirements"]["check"]["max_rms_m"] = 1.0
+
+    (failure,) = found(forged(plan, check), again=None).failures
+    assert "rig.check.max_rms_mm [m] is 0.0001" in failure
+
+
+def test_parts_derived_from_other_requirements_say_so(plan):
+    document = plan.to_document()
+    document["requirements"]["coverage"] = document["request"]["coverage"] = 0.5
+    document["request"]["given"].append("coverage")
+    edited = RigPlan.from_document(document, plan.surface)
+    named = {line.split(":")[0] for line in found(edited, again=None).failures}
+    assert {"coverage.asked", "certificates.asked"} <= named
+    assert "requirements.coverage" not in named
+
+
+def test_a_request_left_out_shows_where_the_code_is_the_same(plan):
+    document = plan.to_document()
+    del document["request"]
+    for part in (document["coverage"], document["certificates"]):
+        del part["asked"]
+    document["members"][0]["coverage"] = document["coverage"]
+    without = RigPlan.from_document(document, plan.surface)
+    (failure,) = found(without).failures
+    assert failure.startswith("request: is missing")
+    older = found(without, again=None)
+    assert older.failures == ()
+    assert any(line.startswith("what was asked") for line in older.trusted)
+
+
+def test_what_is_taken_on_trust_is_told_and_strict_refuses_it(folder, monkeypatch):
+    def quick(plan, mesh, **how):
+        return verify_plan(plan, mesh, **how | {"check_pixels": False})
+
+    monkeypatch.setattr("planning.cli.verify_command.verify_plan", quick)
+    words = ["verify", str(folder / "plan"), "--quiet"]
+    result = CliRunner().invoke(commands, words)
+    assert result.exit_code == 0
+    assert "taken on trust: bounds on the numbers of devices" in result.stdout
+    assert f"give --mesh {folder / 'head.obj'}" in result.stdout
+    strict = [*words, "--strict", "--json", "--mesh", str(folder / "head.obj")]
+    result = CliRunner().invoke(commands, strict)
+    told = json.loads(result.stdout)
+    assert result.exit_code == 1
+    assert told["passed"] is True
+    assert told["claims_held"] == EXACTLY
+    assert not any("--mesh" in line for line in told["taken_on_trust"])
+
+
+def test_strict_holds_where_nothing_is_believed(plan):
+    honest = found(plan)
+    assert not honest.is_strict
+    assert replace(honest, trusted=()).is_strict
+    assert not replace(honest, trusted=(), failures=("one",)).is_strict
+
+
+def test_keys_are_under_a_pattern_as_a_whole():
+    assert is_under("rig.camera.sources.focus.blur_px", {"rig.*.sources": ""})
+    assert not is_under("rig.camera.sourcesx", {"rig.*.sources": ""})
+    assert is_trusted("certificates.cameras.by_count.0.upper_bound_m2")
+    assert not is_trusted("certificates.cameras.count")
