@@ -60,6 +60,7 @@ class Verification:
             "samples": len(self.audit.case.samples),
             "reconstruction": None if pixels is None else pixels.to_document(),
             "compared": self.compared,
+            "proofs": list(self.audit.proofs),
             **({"members": named} if named else {}),
         }
 
@@ -82,6 +83,7 @@ class Verification:
         bounced = self.reconstruction and self.reconstruction.record().interreflection
         if bounced and bounced.warning():
             lines.append(f"warning: {bounced.warning()}")
+        lines += self.audit.proofs
         lines += [f"not met: {sentence}" for sentence in self.unmet]
         lines += [f"FALSE: {sentence}" for sentence in self.failures]
         checked = "pixels checked" if self.reconstruction is not None else "NOT CHECKED"
