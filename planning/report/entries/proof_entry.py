@@ -15,6 +15,7 @@ from planning.proofs.quotas import required_samples
 from planning.proofs.selection import cover_problem
 from planning.report.partial_plan import PartialPlan
 from planning.scene.draws import DRAWS, Draw
+from planning.scene.lighting import light_on
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from solvers.covers.cover import reduced_problem
@@ -28,6 +29,8 @@ _BUDGET, _SPARE = 3e9, 1 / 250
 # Of fresh samples that confirmed no cover of projectors one in so many joined.
 _JOINED = 3
 _MOST_ROUNDS = 6
+# Farther apart devices stand elsewhere [m].
+_MOVED = 1e-6
 
 
 def with_proofs(
@@ -40,8 +43,9 @@ def with_proofs(
     """
     if partial.truncated or partial.stationed is not None:
         return certificates, None
-    scene, candidates = partial.scene, partial.stage.candidates
-    cover, limits = partial.camera_stage.cover, partial.scene.requirements
+    scene, limits = partial.scene, partial.scene.requirements
+    candidates, cover = partial.stage.candidates, partial.camera_stage.cover
+    target = cover.samples.target
     stated = {
         "projector": (
             certificates.projectors,
@@ -51,7 +55,7 @@ def with_proofs(
         ),
         "camera": (
             certificates.cameras,
-            _frozen(scene, cover.samples.target, _camera_draws()),
+            _frozen(scene, target, _camera_draws()) if _stand(partial) else None,
             cover.measured,
             limits.coverage,
         ),
@@ -72,6 +76,15 @@ def with_proofs(
     file = ProofFile.of(proofs)
     record = ProofRecord(path=PROOF, sha256=file.sha256)
     return certificates.changed(**changed, proof=record), file
+
+
+def _stand(partial: PartialPlan) -> bool:
+    """Whether the projectors stand where they stood when cameras were covered for."""
+    lit, projectors = partial.camera_stage.cover.samples, partial.final_projectors
+    return len(lit.lights) == len(projectors) and all(
+        np.allclose(light.offsets, light_on(p, lit.target).offsets, rtol=0, atol=_MOVED)
+        for light, p in zip(lit.lights, projectors, strict=True)
+    )
 
 
 _Ints = NDArray[np.int64]
@@ -129,12 +142,12 @@ def _proof(
             return CoverProof(
                 draws,
                 points,
-                faces.astype(np.int32),
+                faces,
                 found.n_sets,
-                found.stand_in.astype(np.int32),
+                found.stand_in,
                 found.multipliers,
-                found.nodes.astype(np.int32),
-                found.groups.astype(np.int32),
-                found.group_ends.astype(np.int32),
+                found.nodes,
+                found.groups,
+                found.group_ends,
             )
     return None

@@ -297,9 +297,9 @@ def _remedies(kind: str, document: PlanDocument, share: float) -> tuple[str, ...
     if allowed is None or needed.count <= allowed or in_vain:
         return (accept,)
     bound = (
-        "proved over the candidates"
+        f"{proof.candidates.status} over the candidates"
         if needed.lower_bound == needed.count
-        else f"at least {needed.lower_bound} proved over the candidates"
+        else f"at least {needed.lower_bound} {proof.candidates.status} over the candidates"
     )
     option_of_count = f"--max-{kind} {needed.count} ({bound})"
     field = () if needed.wider_field is None else (needed.wider_field,)

@@ -169,12 +169,12 @@ def _robust(request: PlanRequest, asked: Requirements) -> Robust:
 
 
 def _cut(plan: RigPlan) -> RigPlan:
-    return RigPlan(plan.document.changed(truncated=True), plan.surface)
+    return replace(plan, document=plan.document.changed(truncated=True))
 
 
 def _with(plan: RigPlan, robust: Robust) -> RigPlan:
     requirements = replace(plan.requirements, robust=robust)
-    return RigPlan(plan.document.changed(requirements=requirements), plan.surface)
+    return replace(plan, document=plan.document.changed(requirements=requirements))
 
 
 def _drawn(
@@ -260,4 +260,4 @@ def _recorded(rounds: Sequence[_Round], robust: Robust) -> tuple[RigPlan, Partia
         missed_by_without=first.missed_by,
     )
     document = best.plan.document.changed(robust=record)
-    return RigPlan(document, best.plan.surface), best.partial
+    return replace(best.plan, document=document), best.partial

@@ -15,8 +15,8 @@ from solvers.bit_rows import sparse_rows
 from solvers.covers.bounds.reduced_cover import ReducedCover
 from solvers.status import WorkBudget
 
-from .group_branching import likeness
 from .group_bounds import GroupPart, PartBounds
+from .group_branching import likeness
 from .group_parts import children, only_selection
 
 # A multiplier is so many parts of a row's weight at most.
@@ -84,12 +84,23 @@ def excluded(
     """
     kept = reduced.kept
     stand_in = kept[np.maximum(reduced.stand_in, 0)] if kept.size else kept
-    if n_sets <= LOOKED_AT or not kept.size:
-        none = np.empty(0, dtype=np.int64)
-        empty = np.empty((0, len(covers)), dtype=np.uint8)
-        return Exclusion(n_sets, stand_in, empty, none, none, none)
-    tree = _Refutation(_united(covers, stand_in, kept), reduced, n_sets, required)
-    return tree.run(stand_in, budget)
+    united = _united(covers, stand_in, kept)
+    if n_sets > LOOKED_AT and kept.size:
+        return _Refutation(united, reduced, n_sets, required).run(stand_in, budget)
+    if _most_of_few(united, n_sets) >= required:
+        return None
+    none = np.empty(0, dtype=np.int64)
+    empty = np.empty((0, len(covers)), dtype=np.uint8)
+    return Exclusion(n_sets, stand_in, empty, none, none, none)
+
+
+def _most_of_few(covers: NDArray[np.bool_], n_sets: int) -> int:
+    """Return how many rows two sets cover at most, or one, or none."""
+    counts = covers.sum(axis=0)
+    if n_sets < LOOKED_AT or counts.size < LOOKED_AT:
+        return int(counts.max(initial=0)) if n_sets else 0
+    ones = covers.astype(np.float64)
+    return int((counts[:, None] + counts[None, :] - ones.T @ ones).max())
 
 
 def _united(

@@ -18,6 +18,7 @@ from planning.model.words import count_words
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.audit_samples import AuditSamples, samples_on
+from planning.verify.audit.predicates.audit_devices import AuditCamera
 from planning.verify.audit.predicates.predicates import LIT, MEASURED, light_steps
 from planning.verify.audit.predicates.recompute import light_of_plan, pairs_with
 from planning.verify.audit.predicates.reference_devices import (
@@ -111,10 +112,8 @@ def covered_by_candidates(case: AuditCase, kind: str, proof: CoverProof) -> Mask
     lit = np.flatnonzero((light == LIT).any(axis=0))
     some, lit_by = samples.take(lit), light[:, lit] == LIT
 
-    def measured(camera: object) -> Mask:
-        steps = pairs_with(
-            camera, case.projectors, some, lit_by, limits, case.shadow
-        )
+    def measured(camera: AuditCamera) -> Mask:
+        steps = pairs_with(camera, case.projectors, some, lit_by, limits, case.shadow)
         return np.any(steps == MEASURED, axis=0)
 
     columns = mapped(measured, reference_cameras(plan), threads)
@@ -147,8 +146,7 @@ def _drawn_again(case: AuditCase, proof: CoverProof) -> AuditSamples:
     at, of = np.concatenate(points), np.concatenate(faces)
     near = _NEAR * float(np.ptp(surface.mesh.bounds, axis=0).max())
     if not (
-        np.array_equal(of, proof.faces)
-        and np.all(np.abs(at - proof.points) <= near)
+        np.array_equal(of, proof.faces) and np.all(np.abs(at - proof.points) <= near)
     ):
         raise RefutedProofError("its samples aren't those that its draws give")
     return samples_on(surface, at, of, np.ones(len(of), dtype=bool))
