@@ -131,7 +131,7 @@ def _proof(
     draws, points, faces, where = frozen
     every = np.zeros((len(points), covers.shape[1]), dtype=bool)
     every[where] = covers
-    required = required_samples(every.any(axis=1), share)
+    required = required_samples(np.any(every, axis=1), share)
     total = claims.candidates.for_total
     least = claims.needed.lower_bound
     few = (least if total is None else min(least, total)) - 1

@@ -30,8 +30,8 @@ def fewest_words(plan: RigPlan) -> str:
     over = f"over {count.n_candidates} candidates"
     if count.needed is None:
         return (
-            f"at least {count.lower_bound} {word}s claimed {over}; none were found that "
-            f"are enough and whose housings keep off each other"
+            f"at least {count.lower_bound} {word}s claimed {over}; none were found "
+            f"that are enough and whose housings keep off each other"
         )
     if count.needed > count.count:
         return (

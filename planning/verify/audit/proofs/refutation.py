@@ -113,9 +113,7 @@ class _Tree:
         """Return the part that takes some of a group, and the part that takes none."""
         group = np.searchsorted(self.sets, named)
         if not len(group) or not np.isin(named, self.sets).all():
-            raise RefutedProofError(
-                "a group is empty, or names what stands for nothing"
-            )
+            raise RefutedProofError("a group is empty, or names none that stands")
         closed = node.closed.copy()
         closed[group] = True
         within = [bool(np.isin(group, other).all()) for other in node.groups]
