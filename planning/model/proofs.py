@@ -56,7 +56,6 @@ class CoverProof:
     """
 
     BRANCH: ClassVar[int] = -1
-    SELECTION: ClassVar[int] = -2
     whole: ClassVar[int] = 240
 
     draws: Ints

@@ -6,6 +6,7 @@ looking at all of them is cheaper than reading one.
 """
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +22,8 @@ from .group_parts import children, only_selection
 
 # A multiplier is so many parts of a row's weight at most.
 WHOLE = 240
-# Codes of nodes that no multipliers refute.
-BRANCH, SELECTION = -1, -2
+# Code of a node that no multipliers refute.
+BRANCH = -1
 LOOKED_AT = 2
 # The last multipliers are tried on a part before its own are sought.
 _RECENT = 24
@@ -41,9 +42,9 @@ class Exclusion:
         stand_in: For each set the one that stands for it; that is taken to cover what
             all cover that it stands for, shape (n_s,).
         multipliers: Multiplier of each row, in parts of `WHOLE`, shape (n_m, n_e).
-        nodes: The tree, parents first: the multipliers that refute a leaf, `SELECTION`
-            where one selection is left, or `BRANCH`: first the part that takes one of
-            the next group at least, then the part that takes none.
+        nodes: The tree, parents first: the multipliers that refute a leaf, or `BRANCH`:
+            first the part that takes one of the next group at least, then the part that
+            takes none.
         groups: Sets of all groups, one group after the other.
         group_ends: Where each ends, one for each branch.
     """
@@ -135,6 +136,7 @@ class _Refutation:
         self.row_of, self.counts = inverse.ravel(), counts
         by_row = sparse.csr_array(sparse_rows(covers[first]), dtype=np.float64)
         self.by_set = sparse.csr_array(by_row.T)
+        self.covered = np.any(covers[first], axis=1)
         # Bounds take whole steps of weights: of ones there would be two.
         self.cover = replace(
             reduced, by_set=self.by_set, by_row=by_row, weights=counts * _FINE
@@ -174,13 +176,11 @@ class _Refutation:
         return self._written(root, stand_in)
 
     def _refuted(self, node: _Node) -> bool:
-        """Whether a node is a single selection that is too small, or known ones do."""
+        """Whether known multipliers refute a node, or it is one small selection."""
         only = only_selection(node.part, self.n_sets)
         if only is not None:
-            covered = self.by_set[only].sum(axis=0) > 0
-            if int(self.counts[covered].sum()) < self.required:
-                node.code = SELECTION
-                return True
+            # At these the bound is what the selection covers.
+            return self._takes(node, self.by_set[only].sum(axis=0) == 0)
         for index in range(len(self.paid))[-_RECENT:]:
             if self._below_required(node.part, index):
                 node.code = index
@@ -189,9 +189,12 @@ class _Refutation:
 
     def _refuted_by(self, node: _Node, part: GroupPart) -> bool:
         """Whether the multipliers of a part refute it when they are rounded."""
-        shares = np.round(part.shares * WHOLE).astype(np.uint8)
         # What nobody covers weighs nothing where its multiplier is its weight.
-        shares[np.diff(self.by_set.T.tocsr().indptr) == 0] = WHOLE
+        return self._takes(node, np.where(self.covered, part.shares, 1.0))
+
+    def _takes(self, node: _Node, parts: NDArray[Any]) -> bool:
+        """Whether multipliers, as parts of weights, refute a node; they are kept."""
+        shares = np.round(parts * float(WHOLE)).astype(np.uint8)
         whole = shares.astype(np.int64) * self.counts
         self.paid.append(self.by_set @ whole.astype(np.float64))
         self.unpaid.append(WHOLE * int(self.counts.sum()) - int(whole.sum()))

@@ -73,8 +73,7 @@ class _Tree:
     def __init__(
         self, covers: Mask, sets: Ints, proof: CoverProof, required: int
     ) -> None:
-        self.covers, self.sets, self.proof = covers, sets, proof
-        self.required = required
+        self.sets, self.proof, self.required = sets, proof, required
         shares = proof.multipliers.astype(np.float64)
         if np.any(shares > proof.whole):
             raise RefutedProofError("a multiplier exceeds the weight of a sample")
@@ -130,8 +129,6 @@ class _Tree:
         open_groups = [group[~node.closed[group]] for group in node.groups]
         if spare < 0 or not all(len(group) for group in open_groups):
             return 0.0
-        if code == self.proof.SELECTION:
-            return self._of_selection(node.closed, open_groups, spare)
         if not 0 <= code < len(self.paid):
             raise RefutedProofError(f"there are no multipliers {code}")
         paid, most = self.paid[code].copy(), float(self.unpaid[code])
@@ -141,13 +138,3 @@ class _Tree:
             paid[best] = 0.0
         others = np.sort(np.where(node.closed, 0.0, paid))
         return most + float(others[len(others) - spare :].sum())
-
-    def _of_selection(self, closed: Mask, groups: list[Ints], spare: int) -> float:
-        """The same of the one selection that is left, looked at."""
-        taken = np.concatenate([np.empty(0, dtype=np.int64), *groups])
-        others = np.setdiff1d(np.flatnonzero(~closed), taken)
-        if len(taken) != len(groups) or (spare and len(others) > spare):
-            raise RefutedProofError("a leaf holds several selections")
-        taken = np.concatenate([taken, others]) if spare else taken
-        covered = self.covers[:, taken].any(axis=1)
-        return float(self.proof.whole * int(covered.sum()))
