@@ -1,11 +1,11 @@
 """Bounds over the candidates, derived again: what it takes, and whether others agree.
 
-Usage: python -m benchmarks.plans.proofs [--plans N]   (ringrig installed, from a
-    checkout)
+Usage: python -m benchmarks.plans.proofs [--plans N] [--few]   (ringrig installed,
+    from a checkout)
 
 Plans the sample, heads of `plan sample --variant`, and the shared meshes where they are
-present, in both lights, N plans in all (20); more is asked of every other head, so that
-more devices are needed. Prints of each bound: how many are needed at least; the nodes
+present, in both lights, N plans in all (20); with --few, few candidates are offered.
+Prints of each bound: how many are needed at least; the nodes
 and multipliers of its certificate, the bytes of the file; seconds of the finder (stage
 of the plan) and of the checker; whether the plan with the bound raised by one is
 refused; and what HiGHS (scipy.optimize.milp) finds on the matrix of the checker with
@@ -27,7 +27,7 @@ from pathlib import Path
 import numpy as np
 from scipy import sparse
 from scipy.optimize import Bounds, LinearConstraint, milp
-from support import shared_meshes
+from support import shared_meshes, small_job
 
 from geometry.arrays import Mask
 from planning.model.plan import RigPlan
@@ -42,9 +42,8 @@ from solvers import solve_cover
 
 ROOT = Path(__file__).resolve().parents[2]
 _RUN = [sys.executable, "-c", "from planning.cli.main import main; main()"]
-_OPTIONS = ["--max-projectors", "8", "--cameras-by", "cover", "--no-check"]
-_OPTIONS += ["--no-report", "--quiet"]
-_MORE = ["--coverage", "0.99", "--dominant-coverage", "0.98"]
+_OPTIONS = ["--max-projectors", "8", "--cameras-by", "cover"]
+_UNCHECKED = ["--no-check", "--no-report", "--quiet", "--no-patterns"]
 _HEAD = (
     *("mesh", "light", "devices", "at least", "status", "nodes", "multipliers"),
     *("bytes", "finder [s]", "checker [s]", "raised by one", "required"),
@@ -57,7 +56,8 @@ def main() -> int:
     """Print the table; return 1 if a bound doesn't hold or a raised one does."""
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--plans", type=int, default=20)
-    wanted = options.parse_args().plans
+    options.add_argument("--few", action="store_true")
+    given = options.parse_args()
     print(
         f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
         f"cores, python {platform.python_version()}, numpy {np.__version__}\n"
@@ -65,9 +65,13 @@ def main() -> int:
     print(f"| {' | '.join(_HEAD)} |\n|{len(_HEAD) * '---|'}", flush=True)
     wrong = 0
     with tempfile.TemporaryDirectory() as folder:
-        for name, words, light in islice(_jobs(Path(folder)), wanted):
+        few = Path(folder, "few.toml") if given.few else None
+        if few is not None:
+            few.write_text(small_job.RIG)
+        for name, words, light in islice(_jobs(Path(folder)), given.plans):
             out = Path(folder, "plan")
-            command = [*_RUN, *words, *_OPTIONS, "--light", light, "-o", str(out)]
+            command = [*_RUN, *words, *_OPTIONS, *_UNCHECKED, "--light", light]
+            command += ["-o", str(out), *(["--rig", str(few)] if few else [])]
             done = subprocess.run(command, capture_output=True, text=True, check=False)
             if done.returncode not in (0, 1):
                 last = done.stderr.strip().splitlines()[-1:]
@@ -85,8 +89,15 @@ def _jobs(folder: Path) -> Iterator[tuple[str, list[str], str]]:
         for seed in range(1, 5):
             head = folder / f"head{seed}.obj"
             words = ["sample", "--variant", str(seed), "--faces", "8000"]
-            subprocess.run([*_RUN, *words, "-o", str(head)], check=True)
-            yield f"head {seed}", ["--mesh", str(head), *(_MORE if seed % 2 else [])]
+            made = [*_RUN, *words, "-o", str(head)]
+            subprocess.run(made, check=True, capture_output=True)
+            yield (
+                f"head {seed}",
+                [
+                    "--mesh",
+                    str(head),
+                ],
+            )
         for mesh in shared_meshes.MESHES if shared_meshes.FOLDER.is_dir() else ():
             yield mesh.path.name, ["--mesh", str(mesh.path), *mesh.words]
 
