@@ -107,3 +107,22 @@ def test_what_stands_for_a_set_is_taken_to_cover_what_it_does() -> None:
     refute(covers, proof, 4)
     with pytest.raises(RefutedProofError, match="1 candidates cover 9 samples"):
         refute(covers, replace(proof, stand_in=np.zeros(3, dtype=np.int64)), 4)
+
+
+def test_groups_that_share_a_set_are_refused() -> None:
+    """One set could stand for both, and the bound would count two of the budget."""
+    covers = np.zeros((14, 5), dtype=bool)
+    covers[:4, 0] = covers[4:8, 1] = covers[8:12, 2] = True
+    covers[12, 3] = covers[13, 4] = True
+    proof = certificate(covers, 3, 13)
+    assert proof is not None
+    edited = replace(
+        proof,
+        stand_in=np.arange(5),
+        multipliers=np.full((1, 14), proof.whole, dtype=np.uint8),
+        nodes=np.array([-1, -1, 0, 0, 0]),
+        groups=np.array([0, 3, 0, 4]),
+        group_ends=np.array([2, 4]),
+    )
+    with pytest.raises(RefutedProofError, match="sets in common"):
+        refute(covers, edited, best_of(covers, 3))
