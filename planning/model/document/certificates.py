@@ -142,9 +142,9 @@ class Certificate(Part):
 
 
 class ProofRecord(Part):
-    """The file of certificates beside the plan."""
+    """The file of certificates beside the plan, nowhere else."""
 
-    path: str
+    path: Literal["proof.npz"]
     sha256: str
 
 

@@ -22,7 +22,6 @@ from solvers.covers.cover import reduced_problem
 from solvers.covers.exact.exclusion import excluded
 from solvers.status import WorkBudget
 
-PROOF = "proof.npz"
 # Counted work that a certificate may take, and the samples by which it asks for less
 # than is required, if that can be proved: so many the audit may see otherwise.
 _BUDGET, _SPARE = 3e9, 1 / 250
@@ -74,7 +73,7 @@ def with_proofs(
     if not changed:
         return certificates, None
     file = ProofFile.of(proofs)
-    record = ProofRecord(path=PROOF, sha256=file.sha256)
+    record = ProofRecord(path="proof.npz", sha256=file.sha256)
     return certificates.changed(**changed, proof=record), file
 
 
@@ -135,6 +134,8 @@ def _proof(
     total = claims.candidates.for_total
     least = claims.needed.lower_bound
     few = (least if total is None else min(least, total)) - 1
+    if few < 0:
+        return None
     reduced = reduced_problem(cover_problem(every, required))
     for asked in (required - int(_SPARE * required), required):
         found = excluded(every, reduced, few, asked, WorkBudget(_BUDGET))

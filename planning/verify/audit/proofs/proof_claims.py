@@ -47,6 +47,8 @@ def audit_proofs(case: AuditCase, findings: AuditFindings) -> tuple[str, ...]:
         least = claims.needed.lower_bound
         told = f"{name}: at least {least} over the candidates is"
         if claims.candidates.status != "proved":
+            if not least:
+                continue
             lines.append(f"{told} claimed, without a certificate")
             continue
         below = findings.at(f"certificates.{name}.candidates.status")
