@@ -22,7 +22,8 @@ from .console import stop_signals
 
 # What a run writes, and what of an older plan doesn't stay beside a new one.
 _CLOUDS = ("cloud.ply", "deviation.ply")
-OWNED = ("plan.json", "surface.npz", "members", "rig.png", PAGE, "patterns", *_CLOUDS)
+_DATA = ("plan.json", "surface.npz", "proof.npz")
+OWNED = (*_DATA, "members", "rig.png", PAGE, "patterns", *_CLOUDS)
 # `renameat2` and `renamex_np` exchange two entries under these flags.
 _EXCHANGE, _SWAP, _HERE = 2, 2, -100
 # What is younger may be what another run is writing just now [s].

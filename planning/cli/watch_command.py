@@ -56,8 +56,8 @@ def _replanned(
     def news(plan: RigPlan) -> Iterator[str]:
         """Tell what is another than in the plan before."""
         if last is not None:
-            unchecked = RigPlan(
-                last.document.changed(reconstruction=None), last.surface
+            unchecked = replace(
+                last, document=last.document.changed(reconstruction=None)
             )
             differ = [row for row in compared(unchecked, plan) if row.differs]
             for row in differ:

@@ -2,10 +2,11 @@
 
 import hashlib
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, BinaryIO, Self
 
 import numpy as np
 from pydantic import ValidationError
@@ -17,6 +18,7 @@ from planning.model.document.plan_document import FORMAT, VERSION, PlanDocument
 from .errors import InputError, PlanFileError, PlanningError
 from .files import reading, write_together
 from .planned import PlannedCamera, PlannedProjector
+from .proofs import ProofFile
 from .requirements import Requirements
 from .surface import Surface
 
@@ -37,11 +39,14 @@ class RigPlan:
         document: What `plan.json` holds.
         surface: The surface that its claims speak about.
         members: Of a family's plan each member's own; else none.
+        proof: What its bounds over the candidates are derived from; None: nothing is
+            there.
     """
 
     document: PlanDocument
     surface: Surface
     members: tuple["RigPlan", ...] = ()
+    proof: ProofFile | None = None
 
     @property
     def of_member(self) -> bool:
@@ -133,12 +138,14 @@ class RigPlan:
         for record, member in zip(self.document.members, self.members, strict=False):
             member.save(path.parent / record.path)
         surface = path.parent / self.document.surface.path
-        write_together(
-            {
-                surface: lambda file: file.write(self.surface.content),
-                path: lambda file: file.write(self.to_json().encode()),
-            }
-        )
+        record, proof = self.document.certificates.proof, self.proof
+        files: dict[Path, Callable[[BinaryIO], object]] = {
+            surface: lambda file: file.write(self.surface.content),
+            path: lambda file: file.write(self.to_json().encode()),
+        }
+        if record is not None and proof is not None:
+            files[path.parent / record.path] = lambda file: file.write(proof.content)
+        write_together(files)
 
     def to_json(self) -> str:
         """Return the document as JSON text."""
@@ -178,7 +185,9 @@ class RigPlan:
         surface = document.surface
         loaded = Surface.load(path.parent / surface.path, surface.sha256)
         _check_references(document, loaded, str(path))
-        return cls(document, loaded, cls._members(path, document))
+        record = document.certificates.proof
+        proof = record and ProofFile.load(path.parent / record.path, record.sha256)
+        return cls(document, loaded, cls._members(path, document), proof)
 
     @classmethod
     def _members(cls, path: Path, document: PlanDocument) -> tuple[Self, ...]:

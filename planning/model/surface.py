@@ -54,7 +54,7 @@ _MODELS: dict[str, tuple[str, tuple[int | str, ...]]] = {
 _LARGEST = 1e9
 _BESIDE_MESH = list(_ARRAYS)[2:]
 # What numpy and zipfile raise on damaged archives, beside OSError and ValueError.
-_DAMAGED = (
+DAMAGED = (
     BadZipFile,
     EOFError,
     MemoryError,
@@ -184,7 +184,7 @@ class Surface:
                 arrays = {name: archive[name] for name in wanted}
         except KeyError as error:
             raise PlanFileError(f"{path}: {error.args[0]}; plan again") from None
-        except (OSError, ValueError, *_DAMAGED) as error:
+        except (OSError, ValueError, *DAMAGED) as error:
             raise PlanFileError(f"{path}: not a readable .npz ({error})") from None
         try:
             solids = (*_OBSTACLES, *_STATIONS)

@@ -20,6 +20,7 @@ from planning.report.advice.floor_relaxations import (
 from planning.report.advice.what_helps import with_fewer_needed, with_relaxations
 from planning.report.entries.overlaps import overlap_records
 from planning.report.entries.plan_entry import Told, document_of
+from planning.report.entries.proof_entry import with_proofs
 from planning.report.entries.range_entries import ranges_record, with_spread
 from planning.report.entries.station_entries import stations_record
 from planning.report.entries.surface_entry import surface_of
@@ -57,6 +58,8 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
         if not partial.request.evaluates:
             regions = with_small_floor(regions, partial.stage.candidates)
         certificates = with_fewer_needed(certificates, partial, clock)
+    with clock.stage("proofs", "certificates of the bounds over the candidates"):
+        certificates, proof = with_proofs(partial, certificates)
     stationed = partial.stationed
     moved = stationed is not None and stationed.record.kind != "heads"
     overlaps, schedule = overlap_records(among, devices.projectors, moved=moved)
@@ -93,7 +96,7 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
         truncated=partial.truncated,
         **others,
     )
-    return RigPlan(document, surface)
+    return RigPlan(document, surface, proof=proof)
 
 
 def _rounded_devices(partial: PartialPlan) -> Devices:

@@ -1,6 +1,7 @@
 """A plan with what its check found, and what it misses."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from planning.model.plan import InterruptedPlanError, RigPlan
 from planning.model.progress import TIME_IS_UP, Stopwatch
@@ -42,7 +43,7 @@ def with_check(plan: RigPlan, verification: Verification, clock: Stopwatch) -> R
             scan=None if check is None else check.seconds,
         ),
     )
-    return RigPlan(document, plan.surface)
+    return replace(plan, document=document)
 
 
 def axes_may_help(plan: RigPlan, partial: PartialPlan) -> bool:
@@ -75,7 +76,7 @@ def checked_plan(
     Raises:
         InterruptedPlanError: If the check is interrupted; it carries the plan as it is.
     """
-    cut = RigPlan(plan.document.changed(truncated=True), plan.surface)
+    cut = replace(plan, document=plan.document.changed(truncated=True))
     clock.extend()
     try:
         if keep is not None:

@@ -55,8 +55,7 @@ def is_under(key: str, patterns: Mapping[str, str]) -> bool:
 
 # Claims that the audit holds against others, but doesn't recompute; by what they say.
 ON_TRUST = {
-    "bounds on the numbers of devices, and what other numbers cover at most": (
-        "certificates.*.candidates",
+    "bounds over all poses, and what other numbers of devices cover at most": (
         "certificates.*.continuous",
         "certificates.*.needed",
         "certificates.*.by_count",
@@ -126,6 +125,10 @@ def taken_on_trust(
         named = dict.fromkeys(patterns, what)
         if any(is_under(key, named) for key in keys):
             lines.append(what)
+    for kind in ("projectors", "cameras"):
+        proof = getattr(plan.document.certificates, kind)
+        if proof is not None and proof.candidates.status != "proved":
+            lines.append(f"the bound on {kind} over the candidates: claimed, no proof")
     for what, held in (("claims", claims_held), ("figures of the check", figures_held)):
         if held != EXACTLY:
             lines.append(f"the last digits of {what}: {held or 'not compared'}")

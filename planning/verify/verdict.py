@@ -72,6 +72,7 @@ class Verification:
             "compared": self.compared,
             "claims_held": self.claims_held,
             "taken_on_trust": list(self.trusted),
+            "proofs": list(self.audit.proofs),
             **({"members": named} if named else {}),
         }
 
@@ -96,6 +97,7 @@ class Verification:
         bounced = self.reconstruction and self.reconstruction.record().interreflection
         if bounced and bounced.warning():
             lines.append(f"warning: {bounced.warning()}")
+        lines += self.audit.proofs
         lines += [f"taken on trust: {sentence}" for sentence in self.trusted]
         lines += [f"not met: {sentence}" for sentence in self.unmet]
         lines += [f"FALSE: {sentence}" for sentence in self.failures]

@@ -191,7 +191,7 @@ def test_bounds_over_all_poses_are_told_each_after_its_count(plan):
         ("projector", "direction in" if parallel else "position and aim in"),
         ("camera", "position, aim and roll in"),
     ):
-        head = rf"(PROVED|BOUND) +(at least )?\d+ {kind}"
+        head = rf"(PROVED|CLAIMED|BOUND) +(at least )?\d+ {kind}"
         (at,) = [i for i, line in enumerate(lines) if re.match(head, line)]
         bound, needed = (proofs[f"{kind}s"][key] for key in ("continuous", "needed"))
         said = lines[at + 1]

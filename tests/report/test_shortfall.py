@@ -62,7 +62,7 @@ def test_out_of_reach_says_how_much_why_and_what_helps(plan):
 def test_one_projector_short_of_light_names_how_many_would_do(plan):
     (line,) = missed(plan, lit_m2=0.4)
     assert line.startswith("1 projector lights 40.0 %")
-    assert "--max-projectors 5 (at least 4 proved over the candidates)" in line
+    assert "--max-projectors 5 (at least 4 claimed over the candidates)" in line
     assert "--dominant-coverage 0.40" in line
 
 

@@ -14,6 +14,7 @@ class CandidateBound(Part):
     """Least number among the candidate poses.
 
     Attributes:
+        status: `proved` where `proof.npz` has what derives it again; else `claimed`.
         for_total: Least number for the required area alone, whatever becomes of single
             regions; absent: no region has a floor.
     """
@@ -21,6 +22,7 @@ class CandidateBound(Part):
     lower_bound: Count
     n_candidates: Count
     proof: str = ""
+    status: Literal["proved", "claimed"] = "claimed"
     for_total: Count | None = None
 
 
@@ -139,14 +141,23 @@ class Certificate(Part):
     alone: Count | None = None
 
 
+class ProofRecord(Part):
+    """The file of certificates beside the plan, nowhere else."""
+
+    path: Literal["proof.npz"]
+    sha256: str
+
+
 class Certificates(Part):
     """The certificates of a plan.
 
     Attributes:
         projectors: None: the pattern `none` has no projector.
         asked: As of `coverage`.
+        proof: What bounds that are `proved` are derived from; None: none is.
     """
 
     projectors: Certificate | None = None
     cameras: Certificate
     asked: str | None = None
+    proof: ProofRecord | None = None

@@ -119,7 +119,7 @@ def _proof(kind: str, proof: Certificate) -> list[str]:
         kind,
         str(proof.count),
         proof.status,
-        str(proof.candidates.lower_bound),
+        f"{proof.candidates.lower_bound}, {proof.candidates.status}",
         str(proof.candidates.n_candidates),
         str(proof.n_samples),
         "" if over is None else str(over.lower_bound),

@@ -192,12 +192,11 @@ def _fewest(plan: RigPlan) -> Iterator[_Block]:
         return
     if len(kinds) > 1 and all(_over_all(proof) for proof in kinds.values()):
         counts = [count_words(proof.count, kind) for kind, proof in kinds.items()]
-        yield (
-            "FEWEST",
-            f"{counts[0]} and, given these, {counts[1]}: proved over candidates and "
-            f"over every pose",
-            2,
-        )
+        held = {proof.candidates.status for proof in kinds.values()}
+        over = "proved over candidates and over every pose"
+        if held != {"proved"}:
+            over = "proved over every pose"
+        yield "FEWEST", f"{counts[0]} and, given these, {counts[1]}: {over}", 2
         return
     for label, (kind, proof) in zip(("FEWEST", ""), kinds.items(), strict=False):
         yield label, _proved(kind, proof, used_up(plan.document, kind)), 2
@@ -233,22 +232,21 @@ def _over_all(proof: Certificate) -> bool:
 
 def _proved(kind: str, proof: Certificate, gone: str) -> str:
     needed, least = proof.needed, proof.candidates.lower_bound
-    over, count = "over the candidates", count_words(proof.count, kind)
+    status, count = proof.candidates.status, count_words(proof.count, kind)
+    over = f"{status} over the candidates"
     if needed.count > proof.count:
-        words = f"at least {needed.lower_bound} {kind}s proved {over}, "
+        words = f"at least {needed.lower_bound} {kind}s {over}, "
         most = f"no more of {gone} in stock"
         most = most if gone else f"at most {proof.count} was asked"
         return f"{words}{needed.count} suffice; {most}"
     if proof.status != "optimal":
-        return f"{count}; at least {least} {_are(least)} needed {over}"
+        return f"{count}; at least {least} {_are(least)} needed, {over}"
     if proof.continuous is None:
-        return f"{count}: proved {over}; nothing is proved over every pose"
+        return f"{count}: {over}; nothing is proved over every pose"
     if _over_all(proof):
-        return f"{count}: proved, {over} and over every pose in the workspace"
+        return f"{count}: {over}, proved over every pose in the workspace"
     least = proof.continuous.lower_bound
-    return (
-        f"{count}: proved {over}; over every pose at least {least} {_are(least)} needed"
-    )
+    return f"{count}: {over}; over every pose at least {least} {_are(least)} needed"
 
 
 def _are(count: int) -> str:

@@ -143,16 +143,16 @@ def _proof(plan: RigPlan, kind: str, share: float, verb: str) -> str:
         f"candidate poses{' that mounts can be set to' * stepped} reach of "
         f"{proof.n_samples} samples{_floors(plan, proof)}{_given(proof)}"
     )
-    name = f"{kind}s"
+    name, held = f"{kind}s", candidates.status.upper()
     if needed.count > count:
         have = f"at least {needed.lower_bound} {name} are needed"
         enough = f"{needed.count} suffice"
         if needed.count <= proof.but_for_bodies:
             enough += " but for their bodies"
-        return f"PROVED   {have}, {enough}, {scope}"
+        return f"{held:<9}{have}, {enough}, {scope}"
     if proof.status == "optimal":
         are = "is" if count == 1 else "are"
-        return f"PROVED   {count_words(count, kind)} {are} the fewest {scope}"
+        return f"{held:<9}{count_words(count, kind)} {are} the fewest {scope}"
     least = candidates.lower_bound
     return f"BOUND    {count} {name}; at least {least} are needed {scope}"
 

@@ -154,7 +154,8 @@ def _remedies(plan: RigPlan, areas: RegionCoverage, kind: str) -> Iterator[str]:
         if allowed is not None and proof.needed.count > allowed:
             yield (
                 f"--max-{kind} {proof.needed.count} "
-                f"(at least {proof.needed.lower_bound} proved over the candidates)"
+                f"(at least {proof.needed.lower_bound} {proof.candidates.status} over "
+                f"the candidates)"
             )
     yield from (f"with these {kind} {change}" for change in areas.relaxations)
 

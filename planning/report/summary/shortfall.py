@@ -296,11 +296,9 @@ def _remedies(kind: str, document: PlanDocument, share: float) -> tuple[str, ...
     in_vain = needed.count <= proof.but_for_bodies
     if allowed is None or needed.count <= allowed or in_vain:
         return (accept,)
-    bound = (
-        "proved over the candidates"
-        if needed.lower_bound == needed.count
-        else f"at least {needed.lower_bound} proved over the candidates"
-    )
+    bound = f"{proof.candidates.status} over the candidates"
+    if needed.lower_bound != needed.count:
+        bound = f"at least {needed.lower_bound} {bound}"
     option_of_count = f"--max-{kind} {needed.count} ({bound})"
     field = () if needed.wider_field is None else (needed.wider_field,)
     total = proof.candidates.for_total

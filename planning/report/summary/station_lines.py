@@ -30,22 +30,22 @@ def fewest_words(plan: RigPlan) -> str:
     over = f"over {count.n_candidates} candidates"
     if count.needed is None:
         return (
-            f"at least {count.lower_bound} {word}s proved {over}; none were found that "
-            f"are enough and whose housings keep off each other"
+            f"at least {count.lower_bound} {word}s claimed {over}; none were found "
+            f"that are enough and whose housings keep off each other"
         )
     if count.needed > count.count:
         return (
-            f"at least {count.lower_bound} {word}s proved {over}, {count.needed} "
+            f"at least {count.lower_bound} {word}s claimed {over}, {count.needed} "
             f"suffice; at most {count.count} was asked"
         )
     found = count_words(count.count, word)
     if count.lower_bound >= count.count:
-        text = f"{found}: proved {over}"
+        text = f"{found}: claimed to be the fewest {over}"
     else:
         more = ""
         if count.needed < count.count:
             more = f", of which {count.needed} suffice for the planner's own samples"
-        text = f"{found}{more}; at least {count.lower_bound} proved {over}"
+        text = f"{found}{more}; at least {count.lower_bound} claimed {over}"
     if count.everywhere is not None:
         text += f"; over every pose at least {count.everywhere}, by their light"
     return text

@@ -28,7 +28,7 @@ def joint_words(plan: RigPlan) -> tuple[str, str] | None:
         return None
     least = "in cost" if _costed(plan) else "of both together"
     if record.status == "optimal":
-        proof = f"{record.needed:g} {least} are proved the least of the candidates"
+        proof = f"{record.needed:g} {least} are claimed the least of the candidates"
     else:
         proof = f"at least {record.lower_bound:g} {least} of the candidates are needed"
     return "JOINT", f"{saved_words(plan, record)}; {proof}"
@@ -54,7 +54,7 @@ def bound_words(plan: RigPlan, record: JointRecord) -> str:
         f"{over.samples} samples"
     )
     if record.status == "optimal":
-        return f"{record.needed:g} {unit} are proved the least {scope}"
+        return f"{record.needed:g} {unit} are claimed the least {scope}"
     return (
         f"at least {record.lower_bound:g} {unit} are needed, {record.needed:g} suffice "
         f"{scope}"

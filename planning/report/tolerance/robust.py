@@ -174,13 +174,13 @@ def _robust(request: PlanRequest, asked: Requirements) -> Robust:
 
 
 def _cut(plan: RigPlan) -> RigPlan:
-    return RigPlan(plan.document.changed(truncated=True), plan.surface)
+    return replace(plan, document=plan.document.changed(truncated=True))
 
 
 def _with(plan: RigPlan, robust: Robust) -> RigPlan:
     requirements = replace(plan.requirements, robust=robust)
     document = signed(plan.document.changed(requirements=requirements))
-    return RigPlan(document, plan.surface)
+    return replace(plan, document=document)
 
 
 def _drawn(
@@ -266,4 +266,4 @@ def _recorded(rounds: Sequence[_Round], robust: Robust) -> tuple[RigPlan, Partia
         missed_by_without=first.missed_by,
     )
     document = best.plan.document.changed(robust=record)
-    return RigPlan(document, best.plan.surface), best.partial
+    return replace(best.plan, document=document), best.partial

@@ -42,7 +42,7 @@ def surviving_proofs(plan: RigPlan) -> list[str]:
     if record is None or asked is None:
         return []
     return [
-        f"{'PROVED' if is_fewest(count) else 'BOUND':<9}{proof_words(kind, count)} "
+        f"{'CLAIMED' if is_fewest(count) else 'BOUND':<9}{proof_words(kind, count)} "
         f"{purpose(asked)}"
         for kind, count in _counts(record)
         if kind == "camera" or asked.survive

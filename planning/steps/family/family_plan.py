@@ -57,7 +57,7 @@ def _named(plan: RigPlan, name: str) -> RigPlan:
     """Return the plan of a member, which says that it is one."""
     (record,) = plan.document.members
     named = plan.document.changed(members=(record.changed(name=name),))
-    return RigPlan(named, plan.surface)
+    return replace(plan, document=named)
 
 
 def met(plan: RigPlan) -> float:

@@ -7,7 +7,7 @@ every requirement and it is cheaper, or as cheap and wider.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from planning.model.document.input_records import RigRecord
@@ -115,7 +115,7 @@ def jointly(planned: Planned) -> Planned:
 
 
 def _cut(plan: RigPlan) -> RigPlan:
-    return RigPlan(plan.document.changed(truncated=True), plan.surface)
+    return replace(plan, document=plan.document.changed(truncated=True))
 
 
 def _slack(plan: RigPlan, partial: PartialPlan) -> float | None:
@@ -167,7 +167,7 @@ class _Joint:
         document = self.plan.document.changed(
             joint=record, timings_s=dict(self.clock.seconds)
         )
-        return RigPlan(document, self.plan.surface)
+        return replace(self.plan, document=document)
 
     def _by_candidates(self, offer: JointOffer, solution: JointSolution) -> None:
         """Complete the program's answer, if it is cheaper than the two stages'."""

@@ -46,6 +46,7 @@ from planning.verify.audit.devices.stock_claims import audit_stock
 from planning.verify.audit.devices.view_claims import audit_views
 from planning.verify.audit.devices.workspace_claims import audit_workspace
 from planning.verify.audit.devices.zone_claims import audit_zones
+from planning.verify.audit.proofs.proof_claims import audit_proofs
 from planning.verify.audit.rings.axis_claims import audit_ring_axes
 from planning.verify.audit.rings.ring_claims import audit_rings
 from planning.verify.audit.stations.station_claims import audit_stations
@@ -132,11 +133,13 @@ class Audit:
         unmet: One sentence for each requirement that the plan, by its own claims,
             misses. That is no false claim.
         case: What was recomputed.
+        proofs: Of each bound over candidates, whether it was derived again.
     """
 
     failures: tuple[str, ...]
     unmet: tuple[str, ...]
     case: AuditCase
+    proofs: tuple[str, ...] = ()
 
     @cached_property
     def areas(self) -> dict[str, dict[str, float]]:
@@ -173,7 +176,8 @@ def audited(case: AuditCase) -> Audit:
     alone = plan.requirements.pattern == "none"
     for audit_claims in _CLAIMS_OF_VIEWS if alone else _CLAIMS:
         audit_claims(case, findings)
-    return Audit(findings.failures, _unmet_requirements(plan), case)
+    proofs = audit_proofs(case, findings)
+    return Audit(findings.failures, _unmet_requirements(plan), case, proofs)
 
 
 def first_false(case: AuditCase, *, quick: bool = False) -> tuple[str, ...]:

@@ -85,7 +85,7 @@ class _Tree(Incumbent):
         self._names = count()
         self._open: list[tuple[float, int, GroupPart]] = []
         self.bounds = PartBounds(prices.priced, n_sets, self._least_priced, budget)
-        self._alike = _likeness(self.bounds.covers, cover.weights)
+        self._alike = likeness(self.bounds.covers, cover.weights)
         sets, floors = np.arange(cover.quotas.size), cover.quotas > 0
         floors &= cover.floored
         of_set = (cover.row_sets == sets[floors, None]) * cover.weights
@@ -158,7 +158,7 @@ def _table_units(cover: ReducedCover) -> float:
     return cover.n_sets * cover.n_sets * cover.weights.size / 16.0
 
 
-def _likeness(
+def likeness(
     covers: NDArray[np.float32], weights: NDArray[np.float64]
 ) -> NDArray[np.float32]:
     """Return the weighted Jaccard index of each pair of sets, shape (n_s, n_s)."""

@@ -148,7 +148,7 @@ def test_costs_of_the_rig_are_those_of_the_plan(case, told, handmade):
     assert found(case, plan) == ()
     words = " ".join(joint_lines(plan))
     assert "2 projectors and 2 cameras for 7 instead of" in words
-    assert "7 in cost are proved the least of 3 projectors" in words
+    assert "7 in cost are claimed the least of 3 projectors" in words
 
 
 def test_the_summary_says_what_was_saved_and_what_is_proved(told):

@@ -1,0 +1,194 @@
+"""Bounds over the candidates, derived again: what it takes, and whether others agree.
+
+Usage: python -m benchmarks.plans.proofs [--plans N] [--few]   (ringrig installed,
+    from a checkout)
+
+Plans the sample, heads of `plan sample --variant`, and the shared meshes where they are
+present, in both lights, N plans in all (20); with --few, few candidates are offered.
+Prints of each bound: how many are needed at least; the nodes
+and multipliers of its certificate, the bytes of the file; seconds of the finder (stage
+of the plan) and of the checker; whether the plan with the bound raised by one is
+refused; and what HiGHS (scipy.optimize.milp) finds on the matrix of the checker with
+one device fewer, in ten times what `solve_cover` takes on it.
+"""
+
+import argparse
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+from scipy import sparse
+from scipy.optimize import Bounds, LinearConstraint, milp
+from support import shared_meshes, small_job
+
+from geometry.arrays import Mask
+from planning.model.plan import RigPlan
+from planning.proofs.selection import cover_problem
+from planning.verify.audit.audit_case import AuditCase, DeviceKind, examine
+from planning.verify.audit.audit_findings import AuditFindings
+from planning.verify.audit.proofs.proof_claims import (
+    audit_proofs,
+    covered_by_candidates,
+)
+from solvers import solve_cover
+
+ROOT = Path(__file__).resolve().parents[2]
+_RUN = [sys.executable, "-c", "from planning.cli.main import main; main()"]
+_OPTIONS = ["--max-projectors", "8", "--cameras-by", "cover"]
+_UNCHECKED = ["--no-check", "--no-report", "--quiet", "--no-patterns"]
+_HEAD = (
+    *("mesh", "light", "devices", "at least", "status", "nodes", "multipliers"),
+    *("bytes", "finder [s]", "checker [s]", "raised by one", "required"),
+    "HiGHS, one fewer",
+)
+_LEAST_S = 2.0
+
+
+def main() -> int:
+    """Print the table; return 1 if a bound doesn't hold or a raised one does."""
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--plans", type=int, default=20)
+    options.add_argument("--few", action="store_true")
+    given = options.parse_args()
+    print(
+        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
+        f"cores, python {platform.python_version()}, numpy {np.__version__}\n"
+    )
+    print(f"| {' | '.join(_HEAD)} |\n|{len(_HEAD) * '---|'}", flush=True)
+    wrong = 0
+    with tempfile.TemporaryDirectory() as folder:
+        few = Path(folder, "few.toml") if given.few else None
+        if few is not None:
+            few.write_text(small_job.RIG)
+        for name, words, light in islice(_jobs(Path(folder)), given.plans):
+            out = Path(folder, "plan")
+            command = [*_RUN, *words, *_OPTIONS, *_UNCHECKED, "--light", light]
+            command += ["-o", str(out), *(["--rig", str(few)] if few else [])]
+            done = subprocess.run(command, capture_output=True, text=True, check=False)
+            if done.returncode not in (0, 1):
+                last = done.stderr.strip().splitlines()[-1:]
+                print(f"| {name} | {light} | no plan: {' '.join(last)} |", flush=True)
+                continue
+            for row, holds in _rows(RigPlan.load(out / "plan.json")):
+                print(f"| {name} | {light} | {' | '.join(row)} |", flush=True)
+                wrong += not holds
+    return int(wrong > 0)
+
+
+def _jobs(folder: Path) -> Iterator[tuple[str, list[str], str]]:
+    def meshes() -> Iterator[tuple[str, list[str]]]:
+        yield "face.obj", ["--mesh", str(ROOT / "face.obj")]
+        for seed in range(1, 5):
+            head = folder / f"head{seed}.obj"
+            words = ["sample", "--variant", str(seed), "--faces", "8000"]
+            made = [*_RUN, *words, "-o", str(head)]
+            subprocess.run(made, check=True, capture_output=True)
+            yield (
+                f"head {seed}",
+                [
+                    "--mesh",
+                    str(head),
+                ],
+            )
+        for mesh in shared_meshes.MESHES if shared_meshes.FOLDER.is_dir() else ():
+            yield mesh.path.name, ["--mesh", str(mesh.path), *mesh.words]
+
+    for name, words in meshes():
+        for light in ("diverging", "parallel"):
+            yield name, words, light
+
+
+def _rows(plan: RigPlan) -> Iterator[tuple[list[str], bool]]:
+    """Yield the cells of each bound, and whether it does what it should."""
+    case = examine(plan, seed=plan.document.seed, threads=1, n_samples=2000)
+    size = 0 if plan.proof is None else len(plan.proof.content)
+    for kind in case.kinds:
+        claims, findings = kind.proof, AuditFindings()
+        least, status = claims.needed.lower_bound, claims.candidates.status
+        begun = time.perf_counter()
+        audit_proofs(_alone(case, kind), findings)
+        took = time.perf_counter() - begun
+        row = [f"{claims.count} {kind.name}s", str(least), status]
+        stage = plan.document.timings_s.get(f"{kind.name}s", 0.0)
+        if plan.proof is None or status != "proved":
+            yield [*row, *("-" for _ in _HEAD[5:])], True
+            continue
+        proof = plan.proof.proofs[kind.name]
+        raised = _refused(case, kind)
+        covers = covered_by_candidates(case, kind.name, proof)
+        required = int(np.ceil(kind.share * int(covers.any(axis=1).sum()) - 1e-9))
+        found = _highs(covers, required, least - 1)
+        yield (
+            [
+                *row,
+                *("looked at" if least <= 3 else str(len(proof.nodes)),),
+                *(str(len(proof.multipliers)), str(size)),
+                *(f"{stage:.1f}", f"{took:.1f}"),
+                *("refused" if raised else "NOT REFUSED", str(required), found),
+            ],
+            raised and not findings.failures and "SMALLER" not in found,
+        )
+
+
+def _alone(case: AuditCase, kind: DeviceKind) -> AuditCase:
+    """The case with one kind of device."""
+    alone = replace(case)
+    alone.__dict__["kinds"] = (kind,)
+    return alone
+
+
+def _refused(case: AuditCase, kind: DeviceKind) -> bool:
+    """Whether the audit refuses a bound, and its file, of one device more."""
+    claims, file = kind.proof, case.plan.proof
+    assert file is not None
+    needed = claims.needed.changed(lower_bound=claims.needed.lower_bound + 1)
+    more = replace(kind, proof=claims.changed(needed=needed))
+    proofs = file.proofs
+    proof = proofs[kind.name]
+    proofs = proofs | {kind.name: replace(proof, n_sets=proof.n_sets + 1)}
+    for made in (file, type(file).of(proofs)):
+        findings = AuditFindings()
+        edited = replace(case, plan=replace(case.plan, proof=made))
+        audit_proofs(_alone(edited, more), findings)
+        if not findings.failures:
+            return False
+    return True
+
+
+def _highs(covers: Mask, required: int, n_sets: int) -> str:
+    """Say what HiGHS covers at most with so many sets, in ten times our time."""
+    begun = time.perf_counter()
+    solve_cover(cover_problem(covers, required), heaviest=False)
+    limit = max(_LEAST_S, 10.0 * (time.perf_counter() - begun))
+    rows = covers[covers.any(axis=1)]
+    n, m = rows.shape
+    links = sparse.hstack([sparse.csr_array(rows.astype(float)), -sparse.eye_array(n)])
+    chosen = np.concatenate([np.ones(m), np.zeros(n)])
+    found = milp(
+        chosen - 1.0,
+        constraints=[
+            LinearConstraint(sparse.csr_array(links), lb=0.0),
+            LinearConstraint(chosen[None], ub=n_sets),
+        ],
+        bounds=Bounds(0.0, 1.0),
+        integrality=np.ones(m + n),
+        options={"time_limit": limit},
+    )
+    if found.x is None:
+        return f"nothing in {limit:.0f} s"
+    sets = np.flatnonzero(found.x[:m] > 0.5)
+    most = int(covers[:, sets].any(axis=1).sum())
+    state = "optimal" if found.status == 0 else f"{limit:.0f} s"
+    return f"{most} ({state})" + " SMALLER" * (most >= required)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

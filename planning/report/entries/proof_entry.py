@@ -1,0 +1,154 @@
+"""What travels with a plan so that others can derive its bounds over candidates."""
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.model.document.certificates import (
+    Certificate,
+    Certificates,
+    ProofRecord,
+)
+from planning.model.proofs import CoverProof, ProofFile
+from planning.proofs.quotas import required_samples
+from planning.proofs.selection import cover_problem
+from planning.report.partial_plan import PartialPlan
+from planning.scene.draws import DRAWS, Draw
+from planning.scene.lighting import light_on
+from planning.scene.samples import Target
+from planning.scene.scene import Scene
+from solvers.covers.cover import reduced_problem
+from solvers.covers.exact.exclusion import excluded
+from solvers.status import WorkBudget
+
+# Counted work that a certificate may take, and the samples by which it asks for less
+# than is required, if that can be proved: so many the audit may see otherwise.
+_BUDGET, _SPARE = 3e9, 1 / 250
+# Of fresh samples that confirmed no cover of projectors one in so many joined.
+_JOINED = 3
+_MOST_ROUNDS = 6
+# Farther apart devices stand elsewhere [m].
+_MOVED = 1e-6
+
+
+def with_proofs(
+    partial: PartialPlan, certificates: Certificates
+) -> tuple[Certificates, ProofFile | None]:
+    """Return the certificates, those that can be derived again called proved.
+
+    Of devices at stations what is proved is of stations; of a plan that was cut short
+    nothing is made to be checked.
+    """
+    if partial.truncated or partial.stationed is not None:
+        return certificates, None
+    scene, limits = partial.scene, partial.scene.requirements
+    candidates, cover = partial.stage.candidates, partial.camera_stage.cover
+    target = cover.samples.target
+    stated = {
+        "projector": (
+            certificates.projectors,
+            _frozen(scene, candidates.samples, _projector_draws()),
+            candidates.lit,
+            limits.dominant_coverage,
+        ),
+        "camera": (
+            certificates.cameras,
+            _frozen(scene, target, _camera_draws()) if _stand(partial) else None,
+            cover.measured,
+            limits.coverage,
+        ),
+    }
+    proofs: dict[str, CoverProof] = {}
+    changed: dict[str, Certificate] = {}
+    for kind, (claims, frozen, covers, share) in stated.items():
+        if claims is None or frozen is None or not claims.needed.lower_bound:
+            continue
+        proof = _proof(claims, frozen, covers, share)
+        if proof is not None:
+            proofs[kind] = proof
+            if proof.n_sets + 1 >= claims.needed.lower_bound:
+                bound = claims.candidates.changed(status="proved")
+                changed[f"{kind}s"] = claims.changed(candidates=bound)
+    if not changed:
+        return certificates, None
+    file = ProofFile.of(proofs)
+    record = ProofRecord(path="proof.npz", sha256=file.sha256)
+    return certificates.changed(**changed, proof=record), file
+
+
+def _stand(partial: PartialPlan) -> bool:
+    """Whether the projectors stand where they stood when cameras were covered for."""
+    lit, projectors = partial.camera_stage.cover.samples, partial.final_projectors
+    return len(lit.lights) == len(projectors) and all(
+        np.allclose(light.offsets, light_on(p, lit.target).offsets, rtol=0, atol=_MOVED)
+        for light, p in zip(lit.lights, projectors, strict=True)
+    )
+
+
+_Ints = NDArray[np.int64]
+# Draws, points, faces, and the places of a cover's samples among them.
+_Frozen = tuple[_Ints, NDArray[np.float64], _Ints, _Ints]
+
+
+def _projector_draws() -> Iterable[list[tuple[Draw, int]]]:
+    """Draws that the samples of projectors may be of, with how many were taken."""
+    fresh = DRAWS.fresh_projectors
+    more = [(fresh.later(k), _JOINED) for k in range(1, 1 + _MOST_ROUNDS)]
+    return ([(DRAWS.projectors, 1), *more[:k]] for k in range(1 + _MOST_ROUNDS))
+
+
+def _camera_draws() -> Iterable[list[tuple[Draw, int]]]:
+    fresh = DRAWS.fresh_cameras
+    more = [(fresh.later(k), 1) for k in range(1, 1 + _MOST_ROUNDS)]
+    return ([(DRAWS.cameras, 1), *more[:k]] for k in range(1 + _MOST_ROUNDS))
+
+
+def _frozen(
+    scene: Scene, samples: Target, tried: Iterable[list[tuple[Draw, int]]]
+) -> _Frozen | None:
+    """Return draws, all their samples, and which of these a cover's samples are.
+
+    A cover of cameras has those that are lit. None where they are of other draws.
+    """
+    for draws in tried:
+        drawn = [(scene.target_samples(d), every) for d, every in draws]
+        points = np.concatenate([t.samples.points[::every] for t, every in drawn])
+        place = {point: i for i, point in enumerate(map(bytes, points))}
+        where = [place.get(bytes(point)) for point in samples.samples.points]
+        known = [i for i in where if i is not None]
+        if len(known) == len(where):
+            faces = np.concatenate([t.samples.faces[::every] for t, every in drawn])
+            told = np.array([(d.count, d.stream, every) for d, every in draws])
+            return told, points, faces, np.array(known, dtype=np.int64)
+    return None
+
+
+def _proof(
+    claims: Certificate, frozen: _Frozen, covers: NDArray[np.bool_], share: float
+) -> CoverProof | None:
+    draws, points, faces, where = frozen
+    every = np.zeros((len(points), covers.shape[1]), dtype=bool)
+    every[where] = covers
+    required = required_samples(np.any(every, axis=1), share)
+    total = claims.candidates.for_total
+    least = claims.needed.lower_bound
+    few = (least if total is None else min(least, total)) - 1
+    if few < 0:
+        return None
+    reduced = reduced_problem(cover_problem(every, required))
+    for asked in (required - int(_SPARE * required), required):
+        found = excluded(every, reduced, few, asked, WorkBudget(_BUDGET))
+        if found is not None:
+            return CoverProof(
+                draws,
+                points,
+                faces,
+                found.n_sets,
+                found.stand_in,
+                found.multipliers,
+                found.nodes,
+                found.groups,
+                found.group_ends,
+            )
+    return None

@@ -1,0 +1,1 @@
+"""Bounds over the candidates, checked from the certificates beside the plan."""

@@ -1,0 +1,140 @@
+"""That no K candidates cover as many samples as are required, in whole numbers.
+
+What is checked is a tree (`docs/method/covers.md`). A node holds the selections of at
+most K sets of which none is closed, with one or more of each of some groups. A branch
+on a group: one or more of it are taken, or all of it is closed. A leaf falls by
+multipliers lambda_e in {0 .. D}, D for a whole sample: its sets cover at most::
+
+    sum_e (D - lambda_e) + the K largest sums of lambda_e over what a set covers
+
+D-th samples, the K being the largest of each group and the largest others. All of it
+are sums of whole numbers below 2^53, which double precision adds exactly.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geometry.arrays import Array, Ints, Mask
+from planning.model.proofs import CoverProof
+
+# Sums in single precision are exact up to here; more samples go in double precision.
+_EXACT = 1 << 24
+
+
+class RefutedProofError(Exception):
+    """A certificate that doesn't prove what it is for; says why."""
+
+
+@dataclass(eq=False)
+class _Node:
+    """Selections that take none of what is closed, and one or more of each group."""
+
+    closed: Mask
+    groups: list[Ints]
+
+
+def refute(covers: Mask, proof: CoverProof, required: int) -> None:
+    """Hold a certificate against what sets (columns) cover of samples, (n, m).
+
+    Raises:
+        RefutedProofError: If it leaves it open that `proof.n_sets` sets cover as many
+            samples as are required.
+    """
+    sets, owner = np.unique(proof.stand_in, return_inverse=True)
+    # What stands for others covers what they cover: so no selection is left out.
+    united = np.zeros((len(covers), len(sets)), dtype=bool)
+    for column, at in zip(covers.T, owner.tolist(), strict=True):
+        united[:, at] |= column
+    if proof.n_sets <= 2:
+        most = _most_of_few(united, proof.n_sets)
+        if most >= required:
+            raise RefutedProofError(
+                f"{proof.n_sets} candidates cover {most} samples, {required} are "
+                f"required"
+            )
+        return
+    _Tree(united, sets, proof, required).check()
+
+
+def _most_of_few(covers: Mask, n_sets: int) -> int:
+    """Return how many samples so many sets, two at most, cover, all looked at."""
+    counts = covers.sum(axis=0)
+    if n_sets < 2 or len(counts) < 2:
+        return int(counts.max(initial=0)) if n_sets else 0
+    ones = covers.astype(np.float32 if len(covers) < _EXACT else np.float64)
+    both = ones.T @ ones
+    return int((counts[:, None] + counts[None, :] - both).max())
+
+
+class _Tree:
+    """Follows the nodes of a certificate and holds every leaf below what is asked."""
+
+    def __init__(
+        self, covers: Mask, sets: Ints, proof: CoverProof, required: int
+    ) -> None:
+        self.sets, self.proof, self.required = sets, proof, required
+        shares = proof.multipliers.astype(np.float64)
+        if np.any(shares > proof.whole):
+            raise RefutedProofError("a multiplier exceeds the weight of a sample")
+        self.unpaid = proof.whole * len(covers) - shares.sum(axis=1)
+        self.paid: Array = shares @ covers
+        ends = proof.group_ends
+        self.groups = np.split(proof.groups, ends[:-1]) if len(ends) else []
+
+    def check(self) -> None:
+        """Hold all nodes.
+
+        Raises:
+            RefutedProofError: If one is open, or the tree isn't whole.
+        """
+        waiting = [_Node(np.zeros(len(self.sets), dtype=bool), [])]
+        branches = iter(self.groups)
+        for code in self.proof.nodes.tolist():
+            if not waiting:
+                raise RefutedProofError("nodes are left over")
+            node = waiting.pop()
+            if code == self.proof.BRANCH:
+                group = next(branches, None)
+                if group is None:
+                    raise RefutedProofError("a branch has no group")
+                waiting += reversed(self._split(node, group))
+            elif self._most(node, code) >= self.required * self.proof.whole:
+                raise RefutedProofError(
+                    f"a part of the selections of {self.proof.n_sets} may cover "
+                    f"{self._most(node, code) / self.proof.whole:.1f} samples, "
+                    f"{self.required} are required"
+                )
+        if waiting:
+            raise RefutedProofError(f"{len(waiting)} parts aren't looked at")
+
+    def _split(self, node: _Node, named: Ints) -> tuple[_Node, _Node]:
+        """Return the part that takes some of a group, and the part that takes none."""
+        group = np.searchsorted(self.sets, named)
+        if not len(group) or not np.isin(named, self.sets).all():
+            raise RefutedProofError("a group is empty, or names none that stands")
+        closed = node.closed.copy()
+        closed[group] = True
+        within = [bool(np.isin(group, other).all()) for other in node.groups]
+        for other, inside in zip(node.groups, within, strict=True):
+            if not inside and np.isin(group, other).any():
+                raise RefutedProofError("two groups have sets in common")
+        kept = [o for o, inside in zip(node.groups, within, strict=True) if not inside]
+        without = [np.setdiff1d(other, group) for other in node.groups]
+        return _Node(node.closed, [*kept, np.unique(group)]), _Node(closed, without)
+
+    def _most(self, node: _Node, code: int) -> float:
+        """Return D times what the selections of a leaf cover at most."""
+        spare = self.proof.n_sets - len(node.groups)
+        open_groups = [group[~node.closed[group]] for group in node.groups]
+        if spare < 0 or not all(len(group) for group in open_groups):
+            return 0.0
+        if not 0 <= code < len(self.paid):
+            raise RefutedProofError(f"there are no multipliers {code}")
+        paid, most = self.paid[code].copy(), float(self.unpaid[code])
+        for group in open_groups:
+            best = group[np.argmax(paid[group])]
+            most += float(paid[best])
+            paid[best] = 0.0
+        others = np.sort(np.where(node.closed, 0.0, paid))
+        return most + float(others[len(others) - spare :].sum())
