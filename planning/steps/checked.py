@@ -82,8 +82,9 @@ def checked_plan(
         if keep is not None:
             keep(plan)
         with clock.stage("check", "check: audit, then reconstruction from pixels"):
+            # Who planned has just proved the bounds; who receives the plan hasn't.
             verification = verify_plan(
-                plan, threads=threads, progress=clock.say_in_time
+                plan, threads=threads, progress=clock.say_in_time, proofs=False
             )
     except KeyboardInterrupt:
         raise InterruptedPlanError(cut) from None

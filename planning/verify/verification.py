@@ -49,6 +49,7 @@ def verify_plan(
     threads: int | None = None,
     progress: Callable[[str], None] | None = None,
     again: Again | None = None,
+    proofs: bool = True,
 ) -> Verification:
     """Recompute every claim of a plan, then measure its object through pixels.
 
@@ -69,6 +70,7 @@ def verify_plan(
         again: Computes claims again by the code that made them, so that they are held
             to the last digit where nothing of what made the plan is different; None:
             they are held by the audit alone.
+        proofs: Whether bounds over candidates are derived again.
 
     Raises:
         InputError: If `truth` can't be rendered for the plan.
@@ -115,7 +117,7 @@ def verify_plan(
     pixels = None
     # Pixels need what was recomputed, and no claim.
     with abandonable(1) as pool:
-        auditing = pool.submit(audited, case)
+        auditing = pool.submit(audited, case, proofs=proofs)
         try:
             if check_pixels:
                 pixels = _reconstruct(plan, case, truth, other, seed, threads, say, how)

@@ -98,7 +98,7 @@ def test_plates_that_face_apart_take_twice_what_one_takes(both, rig, few):
 
 
 def test_a_member_that_is_short_of_devices_says_what_it_takes(rig, few):
-    """One device can't serve a pair of plates back to back; another member takes one."""
+    """One device can't serve plates back to back; the other member takes one."""
     pair = TriangleMesh.joined([plate(1), plate(-1, 0.04)])
     family = planned(rig, [pair, plate(1)], max_projectors=1)
     short, served = family.members
