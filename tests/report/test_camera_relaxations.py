@@ -483,5 +483,5 @@ def test_too_few_cameras_say_why_how_many_and_which_limit(handmade):
     assert (
         "Of the lit target: 5.0 cm² hidden from every camera that faces it; 2.0 cm² "
         "measured with too large a deviation. What would help: --max-cameras 3 (at "
-        "least 2 proved over the candidates), a = 2 (now 1), or --coverage 0." in line
+        "least 2 claimed over the candidates), a = 2 (now 1), or --coverage 0." in line
     )

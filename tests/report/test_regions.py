@@ -202,7 +202,7 @@ def test_a_missed_floor_names_the_region_by_size_and_place(plan):
     assert "69.0 % is required of each region" in line
     assert "Of it: 18.6 cm² outside the beam" in line
     for remedy in (
-        "--max-projectors 5 (at least 4 proved",
+        "--max-projectors 5 (at least 4 claimed",
         "or with these projectors A = 3",
         "or --region-coverage 0.67 accepts this plan",
     ):

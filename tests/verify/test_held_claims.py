@@ -197,7 +197,7 @@ def test_what_is_taken_on_trust_is_told_and_strict_refuses_it(folder, monkeypatc
     words = ["verify", str(folder / "plan"), "--quiet"]
     result = CliRunner().invoke(commands, words)
     assert result.exit_code == 0
-    assert "taken on trust: bounds on the numbers of devices" in result.stdout
+    assert "taken on trust: bounds over all poses" in result.stdout
     assert f"give --mesh {folder / 'head.obj'}" in result.stdout
     strict = [*words, "--strict", "--json", "--mesh", str(folder / "head.obj")]
     result = CliRunner().invoke(commands, strict)

@@ -51,6 +51,7 @@ def audit_request(case: AuditCase, findings: AuditFindings) -> None:
     if request is not None:
         pairs += [*_of_request(case.plan, request), *_defaults(case.plan, request)]
         _audit_stated(case.plan, findings.at("rig"))
+        _audit_at_a_step(case.plan, request, findings.at("requirements"))
     for key, used, whose, asked in pairs:
         findings.same(key, used, asked, whose, _ROUNDING)
     _audit_digests(case.plan, findings)
@@ -70,6 +71,22 @@ def _audit_stated(plan: RigPlan, findings: AuditFindings) -> None:
         findings.same(f"{key}.light", model.light, rig.light, "rig.light")
 
 
+def _audit_at_a_step(
+    plan: RigPlan, request: RequestRecord, findings: AuditFindings
+) -> None:
+    """Before a turntable, numbers are asked of a step and used of all of them."""
+    if plan.document.rig.turntable is None or plan.document.stations is None:
+        return
+    steps = len(plan.document.stations.stations)
+    for name in ("max_projectors", "max_cameras"):
+        used, asked = getattr(plan.requirements, name), getattr(request, name)
+        findings.holds(
+            asked is None or (used is not None and used <= steps * asked),
+            name,
+            f"{used} is claimed of {steps} steps, but request.{name} is {asked}",
+        )
+
+
 def _of_request(plan: RigPlan, request: RequestRecord) -> Iterator[_Pair]:
     """Yield what was used beside what was asked."""
     used, document = plan.requirements, plan.document
@@ -85,6 +102,8 @@ def _of_request(plan: RigPlan, request: RequestRecord) -> Iterator[_Pair]:
         "dominant_coverage": as_asked,
         "region_coverage": as_asked,
     }
+    if document.rig.turntable is not None:
+        del sources["max_projectors"], sources["max_cameras"]
     for name, source in sources.items():
         key = f"requirements.{name}"
         yield key, getattr(source, name), f"request.{name}", getattr(request, name)
