@@ -14,7 +14,6 @@ from geometry.mesh.sampling import sample_surface
 from geometry.parallel import mapped
 from planning.model.document.certificates import Certificate
 from planning.model.proofs import CoverProof
-from planning.model.words import count_words
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.audit_samples import AuditSamples, samples_on
@@ -86,7 +85,7 @@ def _derived(case: AuditCase, kind: str, claims: Certificate, share: float) -> s
     required = int(np.ceil(share * int(covers.any(axis=1).sum()) - 1e-9))
     refute(covers, proof, required)
     n = proof.n_sets
-    how = "all looked at" if n <= 2 else f"{count_words(len(proof.nodes), 'node')}"
+    how = "all looked at" if n <= 2 else f"nodes: {len(proof.nodes)}"
     return (
         f"no {n} of {covers.shape[1]} poses cover {required} of {len(covers)} samples "
         f"({how})"
