@@ -36,7 +36,8 @@ class HandedPlan(RigPlan):
     @classmethod
     def of(cls, plan: RigPlan) -> Self:
         """Return a plan of the planner in this form."""
-        return cls(plan.document, plan.surface, tuple(map(cls.of, plan.members)))
+        members = tuple(map(cls.of, plan.members))
+        return cls(plan.document, plan.surface, members, plan.proof)
 
     @property
     def missed(self) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 import ast
 import builtins
 import html
+from dataclasses import fields, replace
 from importlib import import_module
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from planning.handover import plan_tables
 from planning.handover.handed_plan import HandedPlan
 from planning.handover.plots import PLOTS
 from planning.model.plan import RequirementError, RigPlan
+from planning.model.proofs import ProofFile
 
 ROOT = Path(planning.__file__).resolve().parents[1]
 
@@ -27,6 +29,16 @@ def plan(handmade):
 def rows(monkeypatch):
     """Tables as they are without pandas."""
     monkeypatch.setattr(plan_tables, "find_spec", lambda _: None)
+
+
+def test_nothing_of_a_plan_is_lost_on_the_way(handmade):
+    member = replace(handmade.build_plan(), proof=ProofFile.of({}))
+    family = replace(member, members=(member,))
+    handed = HandedPlan.of(family)
+    for field in fields(RigPlan):
+        if field.name != "members":
+            assert getattr(handed, field.name) is getattr(family, field.name)
+    assert handed.members[0].proof is member.proof
 
 
 def test_devices_are_where_the_plan_has_them(plan, rows):
