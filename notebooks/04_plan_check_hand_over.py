@@ -107,8 +107,8 @@ print(
 # %% [markdown]
 # ## Hand over
 #
-# A plan is `plan.json`, the surface it speaks of, and the proofs of its numbers. Whoever
-# receives them can recompute every claim and reconstruct the object again.
+# A plan is `plan.json`, its surface, and the proofs of its numbers. Whoever receives them
+# can recompute every claim and reconstruct the object again.
 
 # %%
 folder = Path(tempfile.mkdtemp())
