@@ -107,7 +107,7 @@ print(
 # %% [markdown]
 # ## Hand over
 #
-# A plan is `plan.json`, its surface, and the proofs of its numbers. Whoever receives them
+# A plan is `plan.json`, its surface, and proofs of its numbers. Whoever receives them
 # can recompute every claim and reconstruct the object again.
 
 # %%
