@@ -38,6 +38,10 @@ _FIELDS: dict[str, tuple[str, int]] = {
 }
 
 
+# They take eight times their size when they are checked.
+_MOST_MULTIPLIERS = 1 << 27
+
+
 @dataclass(frozen=True, eq=False)
 class CoverProof:
     """That no `n_sets` candidates cover as many of the samples as are required.
@@ -75,6 +79,9 @@ class CoverProof:
             self.points.shape == (n, 3)
             and self.draws.shape[1:] == (3,)
             and self.multipliers.shape[1:] == (n,)
+            # A leaf names one; so many more are no file of ours.
+            and len(self.multipliers) <= len(self.nodes)
+            and self.multipliers.size <= _MOST_MULTIPLIERS
             and bool(np.all(np.isfinite(self.points)))
             and bool(np.all((self.stand_in >= 0) & (self.stand_in < m)))
             and bool(np.all((self.groups >= 0) & (self.groups < m)))

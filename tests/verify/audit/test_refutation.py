@@ -35,6 +35,31 @@ def test_a_certificate_of_fewer_sets_doesnt_do_for_more() -> None:
         refute(covers, replace(proof, n_sets=4), best + 1)
 
 
+def test_sets_that_stand_for_many_are_all_counted_where_more_may_be_taken() -> None:
+    """Two sets stand for all, three may be taken: together they cover all."""
+    covers = np.zeros((90, 6), dtype=bool)
+    for k in range(6):
+        covers[15 * k : 15 * k + 15, k] = True
+    covers[:, 5] |= covers[:, 4]
+    every = np.zeros(90, dtype=np.int64)
+    none = np.empty(0, dtype=np.int64)
+    forged = CoverProof(
+        draws=np.array([[90, 1, 1]]),
+        points=np.zeros((90, 3)),
+        faces=every,
+        n_sets=3,
+        stand_in=np.array([0, 0, 0, 3, 3, 3]),
+        multipliers=np.full((1, 90), CoverProof.whole, dtype=np.uint8),
+        nodes=np.zeros(1, dtype=np.int64),
+        groups=none,
+        group_ends=none,
+    )
+    assert best_of(covers, 3) == 60
+    for required in (60, 90):
+        with pytest.raises(RefutedProofError, match=r"may cover 90\.0 samples"):
+            refute(covers, forged, required)
+
+
 def test_no_edit_lets_what_is_false_pass() -> None:
     """Whatever a certificate holds, sets that cover enough aren't excluded."""
     rng = np.random.default_rng(0)

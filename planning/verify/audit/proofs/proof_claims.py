@@ -131,7 +131,7 @@ def _drawn_again(case: AuditCase, proof: CoverProof) -> AuditSamples:
     counts = proof.draws[:, 0]
     if not (
         1 <= len(counts) <= _MOST_DRAWS
-        and np.all(counts >= 1)
+        and np.all((counts >= 1) & (counts <= _MOST_SAMPLES))
         and counts.sum() <= _MOST_SAMPLES
         and np.all(proof.draws[:, 1:] >= 0)
         and np.all(proof.draws[:, 2] >= 1)

@@ -136,5 +136,6 @@ class _Tree:
             best = group[np.argmax(paid[group])]
             most += float(paid[best])
             paid[best] = 0.0
-        others = np.sort(np.where(node.closed, 0.0, paid))
-        return most + float(others[len(others) - spare :].sum())
+        # There may be fewer sets than may be taken: then all of them count.
+        dearest = np.sort(np.where(node.closed, 0.0, paid))[::-1]
+        return most + float(dearest[:spare].sum())
