@@ -250,7 +250,7 @@ def _check_references(document: PlanDocument, surface: Surface, where: str) -> N
                 f"models {models.min()} to {models.max()}, the rig has {n}; plan again"
             )
         for place, row in enumerate(document.marginal):
-            named = (row.reference or ()) if hasattr(row, f"n_{kind}s") else ()
+            named = (row.reference or ()) if row.number[0] == kind else ()
             if max(named, default=-1) >= len(models):
                 raise PlanFileError(
                     f"{where}: marginal.{place}.reference names pose {max(named)}, "

@@ -137,14 +137,8 @@ def _marginal(
     records = [record.rings for record in plan.document.projectors]
     evenly = tuple(map(evenly_ringed, devices.projectors, records))
     rows = marginal_records(scene, devices, claims, (lights, views), evenly)
-    made = {_number(row): row for row in rows}
-    return tuple(made.get(_number(row)) for row in plan.document.marginal)
-
-
-def _number(row: ProjectorMarginal | CameraMarginal) -> tuple[str, int]:
-    if isinstance(row, ProjectorMarginal):
-        return "projectors", row.n_projectors
-    return "cameras", row.n_cameras
+    made = {row.number: row for row in rows}
+    return tuple(made.get(row.number) for row in plan.document.marginal)
 
 
 def _measured_with_other_axes(

@@ -6,7 +6,7 @@ from typing import Any
 from planning.model.document.check_records import ReconstructionRecord
 from planning.model.document.made_with import MadeWith
 from planning.model.plan import RigPlan
-from planning.verify.audit.again_claims import compare_again
+from planning.verify.again_claims import compare_again
 from planning.verify.audit.figure_claims import compare_exactly, compare_figures
 
 EXACTLY = "to the last digit"

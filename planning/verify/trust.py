@@ -8,7 +8,6 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 from geometry.mesh.mesh import TriangleMesh
-from planning.model.document.coverage_records import CameraMarginal, ProjectorMarginal
 from planning.model.plan import RigPlan
 
 from .held_figures import EXACTLY
@@ -134,10 +133,11 @@ def taken_on_trust(
     for what, held in (("claims", claims_held), ("figures of the check", figures_held)):
         if held != EXACTLY:
             lines.append(f"the last digits of {what}: {held or 'not compared'}")
+    planned = {("projector", len(plan.projectors)), ("camera", len(plan.cameras))}
     unnamed = [
         place
         for place, row in enumerate(plan.document.marginal)
-        if row.reference is None and _number_of(row) not in _planned(plan)
+        if row.reference is None and row.number not in planned
     ]
     if unnamed:
         lines.append(
@@ -156,18 +156,6 @@ def taken_on_trust(
             "and other bytes"
         )
     return tuple(lines)
-
-
-def _planned(plan: RigPlan) -> set[tuple[str, int]]:
-    return {
-        ("n_projectors", len(plan.projectors)),
-        ("n_cameras", len(plan.cameras)),
-    }
-
-
-def _number_of(row: ProjectorMarginal | CameraMarginal) -> tuple[str, int]:
-    name = "n_projectors" if isinstance(row, ProjectorMarginal) else "n_cameras"
-    return name, getattr(row, name)
 
 
 def _keys(value: Any, key: str = "") -> Iterator[str]:  # noqa: ANN401

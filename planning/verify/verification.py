@@ -96,6 +96,7 @@ def verify_plan(
             seed=seed,
             threads=threads,
             again=again,
+            proofs=proofs,
         )
     if truth is not None and truth.cameras_alone != plan.cameras_alone:
         raise InputError(
@@ -126,22 +127,20 @@ def verify_plan(
             auditing.result()
             raise
         audit = auditing.result()
-    held = "", ""
+    claims_held, figures_held = "", ""
     failures = [*audit.failures, *differs]
     if not failures:
         if again is not None:
             say("claims: computed again by the code that made them")
-        again_false, how_claims = hold_claims(plan, again, threads)
-        failures += again_false
-        held = how_claims, ""
+        differ, claims_held = hold_claims(plan, again, threads)
+        failures += differ
     missed: tuple[str, ...] = ()
     as_planned = truth is None and other is None and not any(how.values())
     if pixels is not None and not as_planned:
         # What is recorded is of the rig as planned, by the built-in renderer.
         failures += pixels.failures
     elif pixels is not None:
-        false, how_figures = hold_figures(plan, pixels.record(), seed)
-        held = held[0], how_figures
+        false, figures_held = hold_figures(plan, pixels.record(), seed)
         if recorded is not None and not recorded.passed and not false:
             missed = pixels.failures
         else:
@@ -151,9 +150,9 @@ def verify_plan(
         audit,
         pixels,
         missed,
-        claims_held=held[0],
-        compared=held[1],
-        trusted=taken_on_trust(plan, mesh, *held),
+        claims_held=claims_held,
+        compared=figures_held,
+        trusted=taken_on_trust(plan, mesh, claims_held, figures_held),
     )
 
 

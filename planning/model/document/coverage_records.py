@@ -181,6 +181,11 @@ class ProjectorMarginal(Part):
     worst_region_lit: float | None = None
     reference: tuple[Place, ...] | None = None
 
+    @property
+    def number(self) -> tuple[str, int]:
+        """The kind of device, and how many."""
+        return "projector", self.n_projectors
+
 
 class CameraMarginal(Part):
     """Areas with so many cameras and all projectors of the plan [m²].
@@ -193,6 +198,11 @@ class CameraMarginal(Part):
     measured_target_m2: float
     measured_surface_m2: float
     reference: tuple[Place, ...] | None = None
+
+    @property
+    def number(self) -> tuple[str, int]:
+        """The kind of device, and how many."""
+        return "camera", self.n_cameras
 
 
 class Overlap(Part):

@@ -37,14 +37,7 @@ class LitCells:
         nearest: _Array,
         psi: _Array,
     ) -> NDArray[np.bool_]:
-        """Return which samples a projector in a cell may light, each with its cell.
-
-        Args:
-            samples: Their numbers, shape (k,).
-            towards: Unit directions from them to the cell's middle, shape (k, 3).
-            nearest: Ignored: no limit of projectors asks for it.
-            psi: Angle about `towards` that holds the cell [rad], shape (k,).
-        """
+        """Return which samples a projector in a cell may light, as `CellLimits`."""
         cone, facing, along = self._cosines(samples, towards, psi)
         best = LightCell(nearest_cos(facing, cone), farthest_cos(along, cone))
         return may_hold(PROJECTOR_LIMITS, best, self._limits, len(samples))

@@ -86,14 +86,7 @@ class MeasurableCells:
         nearest: _Array,
         psi: _Array,
     ) -> NDArray[np.bool_]:
-        """Return which samples a camera in a cell may measure, each with its cell.
-
-        Args:
-            samples: Their numbers, shape (k,).
-            towards: Unit directions from them to the cell's middle, shape (k, 3).
-            nearest: No place of the cell is nearer to them, in [m], shape (k,).
-            psi: Angle about `towards` that holds the cell [rad], shape (k,).
-        """
+        """Return which samples a camera in a cell may measure, as `CellLimits`."""
         self._check_cancelled()
         cone = Cone.of(towards, psi)
         facing = nearest_cos(dot(self._normals[samples], towards), cone)

@@ -20,10 +20,9 @@ from planning.model.requirements import Workspace
 from planning.scene.workspace.admissible import may_be_admissible
 from solvers.bit_rows import parts
 
+from .cell_limits import CellLimits
 from .grown_tree import GrownTree
 from .lit_cells import LitCells
-from .measurable_cells import MeasurableCells
-from .seen_cells import SeenCells
 from .shell_cells import Facing, Seen, ShellCells, directions_of, seen_from
 
 # Pairs of cell and sample looked at together: they stay in the second-level cache.
@@ -55,7 +54,7 @@ class PositionTree(GrownTree):
         *,
         finest: int,
         closed: WidenedMaps | None = None,
-        limits: LitCells | MeasurableCells | SeenCells | None = None,
+        limits: CellLimits | None = None,
     ) -> None:
         self._workspace, self._range = workspace, range_m
         self._points = points - np.array(workspace.centre)
@@ -121,7 +120,7 @@ class PositionTree(GrownTree):
     def widths(self, names: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return about how wide cells look from the centre [rad], shape (n,)."""
         cells = self.cells(names)
-        _, radii = directions_of(self._cubes, cells.level, cells.cell)
+        _, radii = self.facing(cells)
         side = cells.high_m * radii
         deep = 0.5 * (cells.high_m - cells.low_m) * self._reach / cells.low_m
         return (side + deep) / cells.low_m

@@ -140,15 +140,5 @@ def _proof(
     for asked in (required - int(_SPARE * required), required):
         found = excluded(every, reduced, few, asked, WorkBudget(_BUDGET))
         if found is not None:
-            return CoverProof(
-                draws,
-                points,
-                faces,
-                found.n_sets,
-                found.stand_in,
-                found.multipliers,
-                found.nodes,
-                found.groups,
-                found.group_ends,
-            )
+            return CoverProof(draws, points, faces, **vars(found))
     return None

@@ -116,7 +116,7 @@ def _of_request(plan: RigPlan, request: RequestRecord) -> Iterator[_Pair]:
         f"{key}.accuracy_of",
         limits.accuracy_of,
         "request.accuracy_of",
-        (request.accuracy_of),
+        request.accuracy_of,
     )
     sign = -1.0 if request.up.startswith("-") else 1.0
     up = [sign * x for x in _AXES[request.up[-1]]]
@@ -139,7 +139,7 @@ def _of_request(plan: RigPlan, request: RequestRecord) -> Iterator[_Pair]:
             "joint (there)",
             document.joint is not None,
             "request.joint",
-            (request.joint),
+            request.joint,
         )
     axes = document.ring_axes
     if axes is not None:
@@ -160,7 +160,7 @@ def _defaults(plan: RigPlan, request: RequestRecord) -> Iterator[_Pair]:
                 f"request.{name}",
                 value,
                 f"rig.requirements.{name}",
-                (rig.requirements[name]),
+                rig.requirements[name],
             )
     for name, table, key in (
         ("accuracy_mm", rig.limits, "limits.max_sigma_mm"),
@@ -180,7 +180,7 @@ def _of_rig(plan: RigPlan) -> Iterator[_Pair]:
         yield (
             "requirements.region_share",
             used.region_share,
-            ("rig.requirements.region_share"),
+            "rig.requirements.region_share",
             rig.requirements["region_share"],
         )
     for name in _CHECK:

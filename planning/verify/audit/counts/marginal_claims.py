@@ -27,7 +27,7 @@ def audit_marginal(case: AuditCase, findings: AuditFindings) -> None:
     document, least = case.plan.document, dict[str, tuple[float, float]]()
     light, last = _Light(case), dict[str, int]()
     for row in document.marginal:
-        kind, number, areas = _figures(row)
+        (kind, number), areas = row.number, _areas(row)
         below = findings.at(f"marginal.{kind}s.{number}")
         planned = len(getattr(document, f"{kind}s"))
         below.holds(
@@ -57,13 +57,10 @@ def audit_marginal(case: AuditCase, findings: AuditFindings) -> None:
             least[kind], last[kind] = areas, number
 
 
-def _figures(
-    row: ProjectorMarginal | CameraMarginal,
-) -> tuple[str, int, tuple[float, float]]:
+def _areas(row: ProjectorMarginal | CameraMarginal) -> tuple[float, float]:
     if isinstance(row, ProjectorMarginal):
-        return "projector", row.n_projectors, (row.lit_target_m2, row.lit_surface_m2)
-    areas = row.measured_target_m2, row.measured_surface_m2
-    return "camera", row.n_cameras, areas
+        return row.lit_target_m2, row.lit_surface_m2
+    return row.measured_target_m2, row.measured_surface_m2
 
 
 class _Light:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from .audit_findings import AuditFindings
+from planning.verify.audit.audit_findings import AuditFindings
 
 # Where a part that came out again lacks a key, the plan has no business with it either;
 # but for advice, which takes the search to give, for what the audit compares, and for
