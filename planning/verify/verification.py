@@ -31,12 +31,15 @@ from planning.verify.reconstruction.render.countdown import countdown
 from planning.verify.reconstruction.render.mitsuba.physics import Physics
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.scanner import Scanner
+from solvers.one_thread import on_one_thread
 
 from .held_figures import Again, hold_claims, hold_figures
 from .trust import taken_on_trust
 from .verdict import Verification
 
 
+# BLAS must not split sums differently where figures are held to the last digit.
+@on_one_thread
 def verify_plan(
     plan: RigPlan,
     mesh: TriangleMesh | None = None,
