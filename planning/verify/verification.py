@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples
@@ -31,7 +32,6 @@ from planning.verify.reconstruction.render.countdown import countdown
 from planning.verify.reconstruction.render.mitsuba.physics import Physics
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.scanner import Scanner
-from solvers.one_thread import on_one_thread
 
 from .held_figures import Again, hold_claims, hold_figures
 from .trust import taken_on_trust
@@ -39,7 +39,7 @@ from .verdict import Verification
 
 
 # BLAS must not split sums differently where figures are held to the last digit.
-@on_one_thread
+@threadpool_limits.wrap(limits=1, user_api="blas")
 def verify_plan(
     plan: RigPlan,
     mesh: TriangleMesh | None = None,
