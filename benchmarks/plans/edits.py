@@ -49,7 +49,8 @@ from planning.verify.audit.audit import first_false
 from planning.verify.audit.audit_case import examine
 from planning.verify.audit.figure_claims import contradictions
 from planning.verify.held_figures import EXACTLY, hold_claims, hold_figures
-from planning.verify.trust import NO_CLAIM, is_trusted, is_under
+from planning.verify.no_claims import NO_CLAIM, is_under
+from planning.verify.trust import is_trusted
 from planning.verify.verification import verify_plan
 
 from .speed import RUN

@@ -30,8 +30,8 @@ from planning.report.drawing.picture_view import save_picture
 from planning.verify.reconstruction.check.cloud_file import LengthUnit
 from planning.verify.reconstruction.render.countdown import countdown
 
+from .checks.reconstruct_command import CLOUD, save_cloud
 from .console import print_json, reporter, writable
-from .reconstruct_command import CLOUD, save_cloud
 
 _MM = LengthUnit("mm", 1e-3)
 # How near to a prior the object is known to lie, where the user doesn't say.

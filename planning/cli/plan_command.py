@@ -24,7 +24,7 @@ from planning.steps.checked import missed_by
 from planning.steps.recalled_mesh import recalled_mesh
 
 from .console import print_json, progress, reporter, writable
-from .kept_fronts import front_folder, taken_point
+from .front.kept_fronts import front_folder, taken_point
 from .lines.object_lines import optics_lines, size_lines
 from .saved_plans import SavedPlans
 
@@ -76,6 +76,7 @@ def planned_once(
     *,
     begin: float | None = None,
     news: Callable[[RigPlan], Iterable[str]] = lambda plan: (),
+    show: bool = True,
 ) -> tuple[int, RigPlan]:
     """Plan, write the output folder and print the result.
 
@@ -85,6 +86,7 @@ def planned_once(
         cache: What was answered before.
         begin: When the time limit began, on the monotonic clock [s]; None: now.
         news: Returns lines about a plan that stands, before it is checked.
+        show: Whether the result is printed.
 
     Returns:
         The exit code, and the plan that stands.
@@ -151,7 +153,9 @@ def planned_once(
         if not options["no_report"] and not interrupted:
             saved.write_page(plan, clock, threads)
     missed = () if interrupted else missed_by(plan, check=check)
-    if options["as_json"]:
+    if not show:
+        pass
+    elif options["as_json"]:
         ours = {"files": saved.files, "missed": list(missed)}
         print_json(plan.to_document() | ours)
     else:

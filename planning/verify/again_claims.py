@@ -15,18 +15,24 @@ _MOST_TOLD = 8
 
 
 def compare_again(
-    document: Mapping[str, Any], again: Mapping[str, Any]
+    document: Mapping[str, Any], again: Mapping[str, Any], *, whole: bool = False
 ) -> tuple[str, ...]:
     """Return where a plan's document isn't to the last digit what came out again.
 
-    Parts that couldn't be computed are None, and not compared.
+    Parts that couldn't be computed are None, and not compared; but where the `whole`
+    document came out again, there is nothing that couldn't be.
     """
-    findings = AuditFindings()
+    scopes = dict.fromkeys(again, "whole" if whole else "own")
+    if whole:
+        scopes |= dict.fromkeys(document, "whole")
+    else:
+        scopes |= dict.fromkeys(_PARTLY & set(again), "part")
     differing = [
         found
-        for key, part in again.items()
-        for found in _differing(document.get(key), part, key, whole=key not in _PARTLY)
+        for key, scope in scopes.items()
+        for found in _differing(document.get(key), again.get(key), key, scope)
     ]
+    findings = AuditFindings()
     for key, sentence in differing[:_MOST_TOLD]:
         findings.fail(key, sentence)
     if len(differing) > _MOST_TOLD:
@@ -38,17 +44,17 @@ def _differing(
     claimed: Any,  # noqa: ANN401
     made: Any,  # noqa: ANN401
     key: str,
-    *,
-    whole: bool,
+    scope: str,
 ) -> Iterator[tuple[str, str]]:
-    if made is None and isinstance(claimed, Mapping):
+    if made is None and isinstance(claimed, Mapping) and scope != "whole":
         return
     if isinstance(made, Mapping) and isinstance(claimed, Mapping):
         for name, part in made.items():
             yield from _differing(
-                claimed.get(name, "nothing"), part, f"{key}.{name}", whole=whole
+                claimed.get(name, "nothing"), part, f"{key}.{name}", scope
             )
-        for name in set(claimed) - set(made) - _ELSEWHERE if whole else ():
+        spared = _ELSEWHERE if scope == "own" else set[str]()
+        for name in set() if scope == "part" else set(claimed) - set(made) - spared:
             yield (
                 f"{key}.{name}",
                 f"claimed {claimed[name]!r}, no such figure comes out",
@@ -57,6 +63,6 @@ def _differing(
         if len(made) != len(claimed):
             yield key, f"{len(claimed)} are claimed, {len(made)} come out again"
         for place, (one, other) in enumerate(zip(claimed, made, strict=False)):
-            yield from _differing(one, other, f"{key}.{place}", whole=whole)
+            yield from _differing(one, other, f"{key}.{place}", scope)
     elif claimed != made:
         yield key, f"claimed {claimed!r}, the same computation again gives {made!r}"

@@ -4,53 +4,13 @@ Keys are dotted, `*` stands for any name or number; a key stands for all below i
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from fnmatch import fnmatchcase
 from typing import Any
 
 from geometry.mesh.mesh import TriangleMesh
 from planning.model.plan import RigPlan
 
-from .held_figures import EXACTLY
-
-# What no reader of a plan relies on: it says how the plan came about, or advises.
-NO_CLAIM = {
-    "created": "when the plan was made",
-    "command": "how it was asked for, in the user's words",
-    "timings_s": "wall time of that run",
-    "cost.t4": "processor time of that run; C holds it, and must be its sum",
-    "cost.t5": "as t4",
-    "cost.t2": "as t4, a pixel",
-    "cost.t3": "as t4",
-    "cost.C": "a sum of times; that it is their sum is a claim, and audited",
-    "cost.C_before": "as C",
-    "cost.C_all_rings": "as C",
-    "cost.render_s": "processor time of that check",
-    "meshes.*.path": "where the file lay",
-    "surface.selection.source": "where the file with the faces lay",
-    "rig.name": "words of the rig file's author",
-    "rig.description": "as rig.name",
-    "rig.notes": "as rig.name",
-    "rig.*.name": "what a device is called; of which model one is, is a claim",
-    "rig.*.sources": "where the author has a figure from, in words",
-    "rig.calibration.description": "as rig.name",
-    "coverage.relaxations": "advice",
-    "coverage.camera_relaxations": "advice",
-    "regions.*.coverage.relaxations": "advice",
-    "certificates.*.needed.relaxations": "advice",
-    "certificates.*.needed.wider_field": "advice",
-    "certificates.*.routes.why": "advice, in words",
-}
-
-
-def is_under(key: str, patterns: Mapping[str, str]) -> bool:
-    """Return whether a key is one of the patterns, or below one."""
-    parts = key.split(".")
-    return any(
-        fnmatchcase(".".join(parts[:n]), pattern)
-        for pattern in patterns
-        for n in range(1, len(parts) + 1)
-    )
-
+from .held_figures import EXACTLY, WHOLLY
+from .no_claims import is_under
 
 # Claims that the audit holds against others, but doesn't recompute; by what they say.
 ON_TRUST = {
@@ -118,21 +78,16 @@ def taken_on_trust(
         claims_held: How closely its claims were held, "" where they weren't again.
         figures_held: The same of the figures of its check.
     """
-    keys = list(_keys(plan.to_document()))
-    lines: list[str] = []
-    for what, patterns in ON_TRUST.items():
-        named = dict.fromkeys(patterns, what)
-        if any(is_under(key, named) for key in keys):
-            lines.append(what)
+    if claims_held == WHOLLY:
+        return _digits(("figures of the check", figures_held))
+    lines = [*held_against_others(plan)]
     for kind in ("projectors", "cameras"):
         proof = getattr(plan.document.certificates, kind)
         if proof is None or not proof.needed.lower_bound:
             continue
         if proof.candidates.status != "proved" or plan.proof is None:
             lines.append(f"the bound on {kind} over the candidates: claimed, no proof")
-    for what, held in (("claims", claims_held), ("figures of the check", figures_held)):
-        if held != EXACTLY:
-            lines.append(f"the last digits of {what}: {held or 'not compared'}")
+    lines += _digits(("claims", claims_held), ("figures of the check", figures_held))
     planned = {("projector", len(plan.projectors)), ("camera", len(plan.cameras))}
     unnamed = [
         place
@@ -156,6 +111,24 @@ def taken_on_trust(
             "and other bytes"
         )
     return tuple(lines)
+
+
+def held_against_others(plan: RigPlan) -> tuple[str, ...]:
+    """Return which claims of a plan the audit doesn't recompute, a line a kind."""
+    keys = list(_keys(plan.to_document()))
+    return tuple(
+        what
+        for what, patterns in ON_TRUST.items()
+        if any(is_under(key, dict.fromkeys(patterns, what)) for key in keys)
+    )
+
+
+def _digits(*parts: tuple[str, str]) -> tuple[str, ...]:
+    return tuple(
+        f"the last digits of {what}: {held or 'not compared'}"
+        for what, held in parts
+        if held != EXACTLY
+    )
 
 
 def _keys(value: Any, key: str = "") -> Iterator[str]:  # noqa: ANN401

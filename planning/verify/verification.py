@@ -33,8 +33,8 @@ from planning.verify.reconstruction.render.mitsuba.physics import Physics
 from planning.verify.reconstruction.render.photometry import Photometry
 from planning.verify.reconstruction.scanner import Scanner
 
-from .held_figures import Again, hold_claims, hold_figures
-from .trust import taken_on_trust
+from .held_figures import WHOLLY, Again, hold_claims, hold_figures
+from .trust import held_against_others, taken_on_trust
 from .verdict import Verification
 
 
@@ -70,9 +70,9 @@ def verify_plan(
         seed: Of the audit's samples and the pixel noise; the plan's own by default.
         threads: Worker threads; no result depends on them. None: all cores.
         progress: Receives a line when a stage begins.
-        again: Computes claims again by the code that made them, so that they are held
-            to the last digit where nothing of what made the plan is different; None:
-            they are held by the audit alone.
+        again: Computes claims again by the code that made them, some or all, so that
+            they are held to the last digit where nothing of what made the plan is
+            different; None: they are held by the audit alone.
         proofs: Whether bounds over candidates are derived again.
 
     Raises:
@@ -171,6 +171,10 @@ def _verify_family(
         say(f"member {record.name}")
         found.append((record.name, verify_plan(member, progress=say, **how)))
     false = audit_family(plan, [one.audit.case for _, one in found])
+    held = ""
+    if not false and all(one.passed for _, one in found):
+        false, held = hold_claims(plan, how["again"], how["threads"] or n_threads())
+    believed = () if held == WHOLLY else held_against_others(plan)
     # Of one that needn't be served what it misses is no requirement; a lie is a lie.
     served = [one for m, one in enumerate(found) if m not in family.left_out]
     worst = found[min(family.worst, len(found) - 1)][1]
@@ -182,7 +186,11 @@ def _verify_family(
         ),
         worst.reconstruction,
         members=tuple(found),
-        trusted=tuple(f"{n}: {line}" for n, one in found for line in one.trusted),
+        claims_held=held,
+        trusted=(
+            *believed,
+            *(f"{name}: {line}" for name, one in found for line in one.trusted),
+        ),
     )
 
 

@@ -169,7 +169,7 @@ def test_verify_passes_a_good_plan_and_fails_a_spoiled_one(
     )
     # What is false shows without the pixels, which the good plan was held against.
     audit_alone = partial(verify_plan, check_pixels=False)
-    monkeypatch.setattr("planning.cli.verify_command.verify_plan", audit_alone)
+    monkeypatch.setattr("planning.cli.checks.verify_command.verify_plan", audit_alone)
     code, out, err = in_process(monkeypatch, capsys, "verify", spoiled, "--quiet")
     assert (code, err) == (1, "")
     assert "measured_m2" in out

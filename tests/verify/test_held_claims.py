@@ -15,7 +15,8 @@ from planning.model.errors import PlanFileError
 from planning.model.plan import RigPlan
 from planning.report.made_again import again_or_why_not
 from planning.verify.held_figures import EXACTLY
-from planning.verify.trust import is_trusted, is_under
+from planning.verify.no_claims import is_under
+from planning.verify.trust import is_trusted
 from planning.verify.verification import verify_plan
 
 
@@ -193,7 +194,7 @@ def test_what_is_taken_on_trust_is_told_and_strict_refuses_it(folder, monkeypatc
     def quick(plan, mesh, **how):
         return verify_plan(plan, mesh, **how | {"check_pixels": False})
 
-    monkeypatch.setattr("planning.cli.verify_command.verify_plan", quick)
+    monkeypatch.setattr("planning.cli.checks.verify_command.verify_plan", quick)
     words = ["verify", str(folder / "plan"), "--quiet"]
     result = CliRunner().invoke(commands, words)
     assert result.exit_code == 0

@@ -55,8 +55,17 @@ def evaluate(**options: Any) -> None:  # noqa: ANN401
     """
     from planning.cli.plan_command import plan_command
 
+    as_of_plans(options)
+    run(lambda: plan_command(options, sys.argv[1:]), debug=options["debug"])
+
+
+def as_of_plans(options: dict[str, Any]) -> None:
+    """Add what `plan` has besides, as if it weren't given, and check all.
+
+    Raises:
+        click.UsageError: If options exclude each other.
+    """
     if not options["meshes"] + options["files"]:
         raise click.UsageError("give --mesh FILE")
     options |= _OF_PLANS | {"fixed": options["poses"]}
     check_options(options)
-    run(lambda: plan_command(options, sys.argv[1:]), debug=options["debug"])

@@ -56,13 +56,19 @@ _SECTIONS = {
     is_flag=True,
     help="Exit 1 if anything is taken on trust, too: what that is, is always told.",
 )
+@click.option(
+    "--replan",
+    is_flag=True,
+    help="Plan again from the words of the plan's command, and hold every figure to "
+    "the last digit; as long as planning took.",
+)
 @rendering_options
 @threads_option
 @output_options
 def verify(**options: Any) -> None:  # noqa: ANN401
     """Recompute every claim from the files alone, then check from pixels."""
     check_rendering(options)
-    from planning.cli.verify_command import verify_command
+    from planning.cli.checks.verify_command import verify_command
 
     run(lambda: verify_command(options), debug=options["debug"])
 
@@ -87,7 +93,7 @@ def accept(**options: Any) -> None:  # noqa: ANN401
     Simulated after VDI/VDE 2634 part 2: probing error (form and size), sphere spacing
     error and flatness, calibrated perfectly and with what the calibration leaves.
     """
-    from planning.cli.accept_command import accept_command
+    from planning.cli.checks.accept_command import accept_command
 
     run(lambda: accept_command(options), debug=options["debug"])
 

@@ -283,7 +283,7 @@ class GroupedCommand(click.Command):
 @output_options
 def rig_command(**options: Any) -> None:  # noqa: ANN401
     """Plan a rig for a mesh, or for ranges (the default command)."""
-    from planning.cli.front_command import front_command
+    from planning.cli.front.front_command import front_command
     from planning.cli.plan_command import plan_command
 
     check_options(options)

@@ -164,7 +164,7 @@ def reconstruct(**options: Any) -> None:  # noqa: ANN401
         from planning.cli.devices.gray_command import gray_command
 
         run(lambda: gray_command(options), debug=options["debug"])
-    from planning.cli.reconstruct_command import reconstruct_command
+    from planning.cli.checks.reconstruct_command import reconstruct_command
 
     if options["captures"] is not None and options["save_captures"] is not None:
         raise click.UsageError(

@@ -138,6 +138,6 @@ def tolerance(**options: Any) -> None:  # noqa: ANN401
     loosest mounting that will do, and what matters most. A second run with more draws
     goes on. Exit 1 where fewer rigs than --quantile meet every requirement.
     """
-    from planning.cli.tolerance_command import tolerance_command
+    from planning.cli.checks.tolerance_command import tolerance_command
 
     run(lambda: tolerance_command(options), debug=options["debug"])

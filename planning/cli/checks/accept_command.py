@@ -10,13 +10,12 @@ from typing import Any
 import click
 
 from geometry.parallel import n_threads
+from planning.cli.console import print_json, reporter
 from planning.experiments.acceptance.acceptance import Acceptance, Quantity, accept
 from planning.experiments.acceptance.artefacts import BAR, N_PLATES, PLATE, SPHERE
 from planning.model.calibration_errors import CalibrationErrors
 from planning.model.plan import RigPlan
 from planning.verify.reconstruction.scanner import Scanner
-
-from .console import print_json, reporter
 
 _MM = 1e3
 _READINGS: dict[Quantity, str] = {

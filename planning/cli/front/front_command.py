@@ -6,6 +6,9 @@ from typing import Any, BinaryIO
 
 import click
 
+from planning.cli.console import print_json, progress, writable
+from planning.cli.lines.front_lines import front_csv, front_lines
+from planning.cli.plan_command import read_fixed, read_object, timed
 from planning.model.files import write_together
 from planning.report.drawing.front_picture import draw_front
 from planning.rig.rig import load_rig
@@ -14,10 +17,7 @@ from planning.steps.carried import pattern_of_rig
 from planning.steps.front.kept_front import FRONT_FILE, KeptFront
 from planning.steps.front.plan_front import plan_front
 
-from .console import print_json, progress, writable
 from .kept_fronts import front_folder
-from .lines.front_lines import front_csv, front_lines
-from .plan_command import read_fixed, read_object, timed
 
 CSV_FILE, PICTURE_FILE = "pareto.csv", "pareto.png"
 # Options that are wishes by the same name.

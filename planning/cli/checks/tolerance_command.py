@@ -7,14 +7,13 @@ import click
 from threadpoolctl import threadpool_limits
 
 from geometry.parallel import n_threads
+from planning.cli.console import print_json, reporter, writable
 from planning.model.calibration_errors import CalibrationErrors, Mounting
 from planning.model.errors import InputError
 from planning.model.plan import RigPlan
 from planning.report.tolerance.studies import FILE, StudyFile
 from planning.report.tolerance.tolerance import question_of, tolerance_of
 from planning.report.tolerance.tolerance_lines import tolerance_lines
-
-from .console import print_json, reporter, writable
 
 
 def tolerance_command(options: Mapping[str, Any]) -> int:

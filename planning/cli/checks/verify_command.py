@@ -11,6 +11,8 @@ import numpy as np
 from geometry.files.readers import UNITS, load_mesh
 from geometry.mesh.mesh import TriangleMesh
 from geometry.parallel import n_threads
+from planning.cli.checks.planned_again import PlannedAgain
+from planning.cli.console import given, print_json, progress
 from planning.model.plan import RigPlan
 from planning.model.words import count_words
 from planning.report.made_again import again_or_why_not
@@ -20,8 +22,6 @@ from planning.verify.reconstruction.render.mitsuba.physics import Physics
 from planning.verify.reconstruction.render.photometry import assumed_light
 from planning.verify.reconstruction.scanner import Scanner
 from planning.verify.verification import verify_plan
-
-from .console import given, print_json, progress
 
 
 def verify_command(options: Mapping[str, Any]) -> int:
@@ -35,6 +35,9 @@ def verify_command(options: Mapping[str, Any]) -> int:
         mesh = _same_scale(options["mesh"], plan)
     truth = None if options["truth"] is None else RigPlan.load(options["truth"])
     threads = options["threads"] or n_threads()
+    again = again_or_why_not
+    if options["replan"]:
+        again = PlannedAgain(plan, options["mesh"], quiet=options["quiet"])
     with progress(quiet=options["quiet"]) as report:
         verification = verify_plan(
             plan,
@@ -44,7 +47,7 @@ def verify_command(options: Mapping[str, Any]) -> int:
             seed=options["seed"],
             threads=threads,
             progress=report,
-            again=again_or_why_not,
+            again=again,
         )
     if options["as_json"]:
         print_json(verification.to_document())

@@ -14,6 +14,8 @@ from typing import Any
 import click
 
 from geometry.parallel import n_threads
+from planning.cli.console import print_json, reporter, writable
+from planning.cli.lines.deviation_table import deviation_lines
 from planning.model.errors import CapturesError
 from planning.model.files import write_atomically
 from planning.model.plan import RigPlan
@@ -50,9 +52,6 @@ from planning.verify.reconstruction.single_shot.single_shot import (
     reconstruct_single_shot,
 )
 from planning.verify.verification import bare
-
-from .console import print_json, reporter, writable
-from .lines.deviation_table import deviation_lines
 
 CLOUD, DEVIATION, REFINED = "cloud.ply", "deviation.ply", "refined.json"
 # How near the object is taken to lie to the mesh that labels single images.

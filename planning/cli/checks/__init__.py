@@ -1,0 +1,1 @@
+"""What `plan verify`, `accept`, `reconstruct` and `tolerance` do."""

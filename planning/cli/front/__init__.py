@@ -1,0 +1,1 @@
+"""Fronts of numbers of devices: `plan --pareto`, and `--take`."""
