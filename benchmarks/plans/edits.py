@@ -32,7 +32,7 @@ import sys
 import tempfile
 import time
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -40,6 +40,7 @@ from typing import Any
 import numpy as np
 
 from planning import RigPlan
+from planning.cli.checks.planned_again import PlannedAgain
 from planning.cli.other_commands import write_sample
 from planning.model.document.check_records import ReconstructionRecord
 from planning.model.document.request_records import asked_digest
@@ -48,11 +49,12 @@ from planning.report.made_again import again_or_why_not, made_again
 from planning.verify.audit.audit import first_false
 from planning.verify.audit.audit_case import examine
 from planning.verify.audit.figure_claims import contradictions
-from planning.verify.held_figures import EXACTLY, hold_claims, hold_figures
+from planning.verify.held_figures import EXACTLY, WHOLLY, hold_claims, hold_figures
 from planning.verify.no_claims import NO_CLAIM, is_under
 from planning.verify.trust import is_trusted
 from planning.verify.verification import verify_plan
 
+from .edited import KeyPath, edits, leaves, moved, put
 from .speed import RUN
 
 _RIG = """
@@ -69,9 +71,6 @@ n_reference_cameras = 400
 _RENDERED = {"projectors", "cameras", "seed"}
 _SEEN = {*_RENDERED, "requirements"}
 _AGAIN = {*_SEEN, "marginal", "ring_axes", "surface"}
-_MOVES_M, _TURNS_DEG = (2e-5, 1e-4, 1e-3), (0.002, 0.02, 0.2)
-_Path = tuple[str | int, ...]
-_GONE = object()
 
 
 def main() -> int:
@@ -86,29 +85,31 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         folder = asked.plan or _made(Path(name))
         judge = Judge(RigPlan.load(folder / "plan.json"))
-        leaves: dict[str, list[tuple[_Path, Any]]] = defaultdict(list)
-        for path, value in _leaves(judge.document):
-            leaves[_kind(path)].append((path, value))
+        kinds: dict[str, list[tuple[KeyPath, Any]]] = defaultdict(list)
+        for path, value in leaves(judge.document):
+            kinds[_kind(path)].append((path, value))
         ended: dict[str, Counter[str]] = defaultdict(Counter)
         let_by: dict[str, list[str]] = defaultdict(list)
-        for kind, of_kind in leaves.items():
+        for kind, of_kind in kinds.items():
             if not kind.startswith(only):
                 continue
             path, value = of_kind[int(rng.integers(len(of_kind)))]
-            for what, other in _edits(value):
+            for what, other in edits(value):
                 how = judge.edited(path, other)
                 print(f"{kind}: {what}: {how}", file=sys.stderr)
                 if how == "passed":
                     how = _excused(".".join(map(str, path)))
+                if how == "on trust" and judge.differs_planned_again(path, other):
+                    how = "replanned"
                 _note(ended, let_by, kind, f"{what}: {how}", how)
-        for kind, what, edited in _moved(judge.document):
+        for kind, what, edited in moved(judge.document):
             if kind.startswith(only):
                 how = judge.judged(edited, "projectors")
                 _note(ended, let_by, kind, f"{what}: {how}", how)
-    n = sum(map(len, leaves.values()))
+    n = sum(map(len, kinds.values()))
     print(
         f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores; {n} leaves of {len(leaves)} kinds, seed {asked.seed}, "
+        f"cores; {n} leaves of {len(kinds)} kinds, seed {asked.seed}, "
         f"{time.perf_counter() - begin:.0f} s\n"
     )
     return int(_print(ended, let_by))
@@ -125,13 +126,22 @@ class Judge:
         self._plan, self.document = plan, plan.to_document()
         self._case, self._made = found.audit.case, made_again(plan, threads=1)
         self._fresh = found.reconstruction.record()
+        self._whole = PlannedAgain(plan, None, quiet=True)(plan, 1)
+        assert hold_claims(plan, lambda *_: self._whole, 1) == ((), WHOLLY)
 
-    def edited(self, path: _Path, value: object) -> str:
+    def differs_planned_again(self, path: KeyPath, value: object) -> bool:
+        """Whether `plan verify --replan` finds another value at a place."""
+        edited = copy.deepcopy(self.document)
+        put(edited, path, value)
+        plan = self._forged(edited)
+        return bool(hold_claims(plan, lambda *_: self._whole, 1)[0])
+
+    def edited(self, path: KeyPath, value: object) -> str:
         """How the plan ends with another value at a place, and wherever it is again."""
         edited = copy.deepcopy(self.document)
-        _put(edited, path, value)
+        put(edited, path, value)
         if path[0] in ("coverage", "reconstruction"):
-            _put(edited, ("members", 0, *path), value)
+            put(edited, ("members", 0, *path), value)
         excused = _excused(".".join(map(str, path))) != "passed"
         return self.judged(edited, str(path[0]), quick=excused)
 
@@ -219,95 +229,8 @@ def _made(folder: Path) -> Path:
     return folder / "plan"
 
 
-def _kind(path: _Path) -> str:
+def _kind(path: KeyPath) -> str:
     return ".".join("*" if isinstance(key, int) else key for key in path)
-
-
-def _leaves(value: object, path: _Path = ()) -> Iterator[tuple[_Path, Any]]:
-    if isinstance(value, dict) and value:
-        for key, part in value.items():
-            yield from _leaves(part, (*path, key))
-    elif isinstance(value, list) and value:
-        for k, part in enumerate(value):
-            yield from _leaves(part, (*path, k))
-    else:
-        yield path, value
-
-
-def _edits(value: Any) -> Iterator[tuple[str, Any]]:  # noqa: ANN401
-    """Yield other values for a leaf, each with its name."""
-    yield "left out", _GONE
-    if value is not None:
-        yield "null", None
-    if isinstance(value, bool):
-        yield "other truth", not value
-        yield "number", 2
-        yield "word", "true"
-        yield "list", []
-        return
-    if isinstance(value, int | float):
-        edits = {
-            "per mille": value * 1.001 if isinstance(value, float) else value + 1,
-            "tenth": value * 1.1 if isinstance(value, float) else value - 1,
-            "times 500": value * 500,
-            "zero": value * 0,
-            "negative": -value,
-            "a little": value + 1e-3 if isinstance(value, float) else value + 2,
-        }
-        yield from ((key, v) for key, v in edits.items() if v != value)
-        yield "word", "much"
-        yield "list", [value]
-    elif isinstance(value, str):
-        yield "other word", value + "x"
-        yield "empty", ""
-        yield "number", 1
-        yield "list", [value]
-    else:
-        yield "word", "x"
-        yield "number", 7
-        yield "object", {"x": 1}
-        yield "list of two", [1, 2]
-
-
-def _moved(document: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, Any]]]:
-    """Yield plans of which one device, or a ring frame, stands a little elsewhere."""
-    for kind in ("projectors", "cameras"):
-        frames = [("world_from_device",)]
-        if kind == "projectors":
-            both = "world_from_device", "world_from_ring"
-            frames += [("world_from_ring",), both]
-        for names in frames:
-            for words, change in (*_shifts(), *_turns()):
-                edited = copy.deepcopy(document)
-                for name in names:
-                    pose = np.array(edited[kind][0][name])
-                    edited[kind][0][name] = change(pose).tolist()
-                yield f"{kind}.*.{' and '.join(names)}", words, edited
-
-
-def _shifts() -> Iterator[tuple[str, Callable[[np.ndarray], np.ndarray]]]:
-    for length in _MOVES_M:
-        step = np.zeros((4, 4))
-        step[0, 3] = length
-        yield f"moved by {1e3 * length:g} mm", lambda pose, step=step: pose + step
-
-
-def _turns() -> Iterator[tuple[str, Callable[[np.ndarray], np.ndarray]]]:
-    for angle in _TURNS_DEG:
-        c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-        turn = np.eye(4)
-        turn[1:3, 1:3] = [[c, -s], [s, c]]
-        yield f"turned by {angle:g} degrees", lambda pose, turn=turn: pose @ turn
-
-
-def _put(document: dict[str, Any], path: _Path, value: object) -> None:
-    place: Any = document
-    for key in path[:-1]:
-        place = place[key]
-    if value is _GONE:
-        del place[path[-1]]
-    else:
-        place[path[-1]] = copy.deepcopy(value)
 
 
 def _excused(key: str) -> str:
@@ -325,20 +248,20 @@ def _note(
     how: str,
 ) -> None:
     ended[kind.split(".")[0]][how.split(":")[0]] += 1
-    if how not in ("refused", "found"):
+    if how not in ("refused", "found", "replanned"):
         let_by[kind].append(words)
 
 
 def _print(ended: dict[str, Counter[str]], let_by: dict[str, list[str]]) -> bool:
-    kinds = "refused", "found", "no claim", "on trust", "passed", "crashed"
+    kinds = "refused", "found", "replanned", "no claim", "on trust", "passed", "crashed"
     print(f"| section | {' | '.join(kinds)} |\n{(len(kinds) + 1) * '|---'}|")
     total = Counter[str]()
     for section, counts in ended.items():
         total += counts
         print(f"| {section} | {' | '.join(str(counts[kind]) for kind in kinds)} |")
     print(f"| all | {' | '.join(str(total[kind]) for kind in kinds)} |\n")
-    for kind, edits in let_by.items():
-        print(f"{kind}: {'; '.join(edits)}")
+    for kind, ways in let_by.items():
+        print(f"{kind}: {'; '.join(ways)}")
     return bool(total["passed"] or total["crashed"])
 
 
