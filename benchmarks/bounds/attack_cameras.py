@@ -17,8 +17,6 @@ is a violation. Exit 1 if there is any.
 """
 
 import argparse
-import os
-import platform
 import sys
 import time
 from collections.abc import Sequence
@@ -30,6 +28,7 @@ from numpy.typing import NDArray
 from benchmarks.bounds import attack_cells
 from benchmarks.bounds.attack_cells import OwnLight, Tally, Tree
 from benchmarks.bounds.continuous_bounds import jobs
+from benchmarks.machine import machine
 from geometry.curvature.refinement import cut_for_curvature
 from geometry.devices import PinholeModel
 from geometry.files.readers import load_mesh
@@ -208,8 +207,7 @@ def main() -> int:
     """Print the table; return 1 if a bound rests on a cell that lacks a sample."""
     given = _arguments()
     print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores, python {platform.python_version()}, numpy {np.__version__}\n\n"
+        f"{machine()}\n\n"
         f"{given.rows} samples a mesh, cells down to {1 << given.finest} an edge of "
         f"the cube (a quarter without shadows), seed {given.seed}\n\n"
         "| mesh | faces | lens | cells | poses | measured pairs | suspects | "

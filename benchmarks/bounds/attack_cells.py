@@ -22,7 +22,6 @@ stays is a violation. Exit 1 if there is any.
 
 import argparse
 import os
-import platform
 import sys
 import time
 from dataclasses import dataclass, replace
@@ -34,6 +33,7 @@ from numpy.typing import NDArray
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from benchmarks.bounds.continuous_bounds import jobs
+from benchmarks.machine import machine
 from geometry.curvature.refinement import cut_for_curvature
 from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
@@ -370,8 +370,7 @@ def main() -> int:
     """Print the table; return 1 if a bound rests on a cell that lacks a sample."""
     given = _arguments()
     print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores, python {platform.python_version()}, numpy {np.__version__}, trimesh "
+        f"{machine()}, trimesh "
         f"{trimesh.__version__}\n\n"
         f"{given.rows} samples a mesh, maps of {1 << given.finest} cells an edge of "
         f"the cube, cells of positions four times as fine, seed {given.seed}\n\n"

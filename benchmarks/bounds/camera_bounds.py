@@ -14,7 +14,6 @@ field binds. `*`: shadows were left out. A bound in bold equals the count.
 
 import argparse
 import os
-import platform
 import sys
 import time
 from collections import Counter
@@ -22,6 +21,7 @@ from collections import Counter
 import numpy as np
 
 from benchmarks.bounds.continuous_bounds import jobs
+from benchmarks.machine import machine
 from geometry.curvature.refinement import cut_for_curvature
 from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
@@ -44,8 +44,7 @@ def main() -> int:
     """Print the table."""
     given = _arguments()
     print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores, python {platform.python_version()}, numpy {np.__version__}\n\n"
+        f"{machine()}\n\n"
         f"{'--prove' if given.prove else 'default'} effort, at most "
         f"{given.max_projectors} projectors\n"
     )

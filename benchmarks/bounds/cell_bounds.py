@@ -9,7 +9,6 @@ where that has at most 5 million nonzeros. WORDs select rows that contain one of
 """
 
 import os
-import platform
 import sys
 import time
 from collections.abc import Iterator
@@ -21,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from support import cap_trees
 
+from benchmarks.machine import machine
 from solvers.cells import cell_bound, cell_tuples
 from solvers.cells.cell_bound import CellBound, bound_count
 from solvers.cells.cell_problem import CellProblem
@@ -76,10 +76,8 @@ class Clocked:
 def main() -> int:
     """Print the table."""
     print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores (one used), python {platform.python_version()}, numpy "
-        f"{np.__version__}, HiGHS {highspy.Highs().version()}, load before the run "
-        f"{os.getloadavg()[0]:.1f}\n"
+        f"{machine()} (one used), HiGHS {highspy.Highs().version()}, "
+        f"load before the run {os.getloadavg()[0]:.1f}\n"
     )
     print(HEAD)
     print("|" + (HEAD.count("|") - 1) * "---|")

@@ -14,7 +14,6 @@ over all poses. `*`: shadows were left out. A bound in bold equals the count.
 
 import argparse
 import os
-import platform
 import sys
 import time
 from collections import Counter
@@ -24,6 +23,7 @@ from pathlib import Path
 import numpy as np
 from support import shared_meshes
 
+from benchmarks.machine import machine
 from geometry.curvature.refinement import cut_for_curvature
 from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
@@ -46,10 +46,7 @@ EFFORTS = {"default": DEFAULT, "prove": PROVE}
 def main() -> int:
     """Print the table; return 1 where a bound contradicts a count."""
     given = _arguments()
-    print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores, python {platform.python_version()}, numpy {np.__version__}\n"
-    )
+    print(f"{machine()}\n")
     cases = [(a, b) for b in given.tangents for a in given.shares]
     efforts = given.efforts if given.more == 1 else [f"{given.more} times the poses"]
     heads = [

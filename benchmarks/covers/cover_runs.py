@@ -1,8 +1,6 @@
 """One run of our cover search, timed and its work counted, for the benchmarks."""
 
 import math
-import os
-import platform
 import time
 from dataclasses import dataclass
 from functools import wraps
@@ -43,14 +41,6 @@ class OurRun:
     def proved(self) -> bool:
         """Whether the bound closes the gap, by the numbers."""
         return self.bound >= self.solution.cost * (1.0 - 1e-9)
-
-
-def machine_line() -> str:
-    """Return what the figures were measured on."""
-    return (
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores, python {platform.python_version()}, numpy {np.__version__}"
-    )
 
 
 def run_ours(problem: CoverProblem, *, time_limit: float, budget: float) -> OurRun:

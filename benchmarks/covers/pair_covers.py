@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.optimize import Bounds, LinearConstraint, milp
 
-from benchmarks.covers.cover_runs import machine_line
 from benchmarks.covers.visibility_instances import Instance, SeenSamples, seen_samples
+from benchmarks.machine import machine
 from solvers import CoverProblem, solve_cover
 from solvers.covers.paired.pair_cover import solve_pair_cover
 from solvers.covers.paired.pair_problem import PairCoverProblem, packed_pairs
@@ -48,7 +48,7 @@ def main() -> int:
     """Print a row for each instance; return 1 on a fault."""
     given = _arguments()
     print(
-        f"{machine_line()}\n\nShare {given.share:g}, angles {ANGLES[0]:g} to "
+        f"{machine()}\n\nShare {given.share:g}, angles {ANGLES[0]:g} to "
         f"{ANGLES[1]:g} degrees, work budget {given.budget:.0e} units; HiGHS at most "
         f"{given.peer_limit:g} s.\n"
     )

@@ -22,7 +22,8 @@ from scipy import sparse
 from support import set_cover_files
 
 from benchmarks.covers.cover_peers import PeerAnswer, ask_peer
-from benchmarks.covers.cover_runs import for_peers, machine_line, peer_cell, run_ours
+from benchmarks.covers.cover_runs import for_peers, peer_cell, run_ours
+from benchmarks.machine import machine
 from solvers import CoverProblem
 
 COLUMNS = (
@@ -44,7 +45,7 @@ def main() -> int:
     """Print the table; return 1 if it contradicts itself."""
     given = _arguments()
     print(
-        f"{machine_line()}\n\nTime limit {given.time_limit:g} s and work budget "
+        f"{machine()}\n\nTime limit {given.time_limit:g} s and work budget "
         f"{given.budget:.0e} units each; `proved` where our bound meets our cover.\n"
     )
     columns = COLUMNS + (("HiGHS: cover / bound",) if given.peers else ())

@@ -12,12 +12,12 @@ how many there were of each kind and how many differed from the truth.
 import collections
 import multiprocessing
 import os
-import platform
 import sys
 import time
 
 import numpy as np
 
+from benchmarks.machine import machine
 from solvers import CoverProblem
 from tests.solvers.covers import test_small_covers
 
@@ -27,10 +27,7 @@ _CHUNK = 50
 def main() -> int:
     """Print the table; return 1 if an instance differed."""
     n = int(sys.argv[1]) if len(sys.argv) > 1 else 10_000
-    print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores, python {platform.python_version()}, numpy {np.__version__}\n"
-    )
+    print(f"{machine()}\n")
     begin = time.perf_counter()
     kinds: collections.Counter[str] = collections.Counter()
     wrong: collections.Counter[str] = collections.Counter()

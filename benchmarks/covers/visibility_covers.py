@@ -34,11 +34,11 @@ from benchmarks.covers.cover_peers import SOLVERS, PeerAnswer, PeerProblem, ask_
 from benchmarks.covers.cover_runs import (
     OurRun,
     for_peers,
-    machine_line,
     peer_cell,
     run_ours,
 )
 from benchmarks.covers.visibility_instances import Instance, covers
+from benchmarks.machine import machine
 from solvers import CoverProblem
 from solvers.covers.bounds.reductions import reduce_problem
 
@@ -89,7 +89,7 @@ def main() -> int:
         f"{given.peer_least:g} s{most}."
     )
     print(
-        f"{machine_line()}\n\nOurs: time limit {given.time_limit:g} s, work budget "
+        f"{machine()}\n\nOurs: time limit {given.time_limit:g} s, work budget "
         f"{given.budget:.0e} units.{peers if asked else ''}\n\n"
         f"| {' | '.join(columns)} |\n|{len(columns) * '---|'}",
         flush=True,

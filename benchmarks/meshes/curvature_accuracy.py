@@ -10,8 +10,6 @@ with vertex noise; and of the routes that weren't taken. Writes the figure
 docs/images/curvature_convergence.png.
 """
 
-import os
-import platform
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -23,6 +21,7 @@ from PIL import Image, ImageDraw, ImageFont
 from scipy.spatial.transform import Rotation
 from support import curved_shapes
 
+from benchmarks.machine import machine
 from geometry.curvature.curvature import CurvatureField, principal_curvatures
 from geometry.mesh.diffusion import diffused
 from geometry.mesh.mesh import TriangleMesh
@@ -44,8 +43,7 @@ def main() -> int:
     """Print the tables and write the figure; return 0."""
     shapes = curved_shapes
     print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores; python {platform.python_version()}, numpy {np.__version__}\n\n"
+        f"{machine()}\n\n"
         "Each entry: rms error of k1 / of k2 in % of the largest curvature, rms angle "
         "of k1's direction.\n"
     )

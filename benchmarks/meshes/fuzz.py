@@ -9,15 +9,14 @@ restarted when it dies. A tenth of what is read goes through curvature and regio
 A failure is made again with `python -m benchmarks.meshes.fuzz 1 SEED NUMBER`.
 """
 
-import os
-import platform
 import sys
 import time
 from collections import Counter
 from pathlib import Path
 
-import numpy as np
 from support import fuzzing
+
+from benchmarks.machine import machine
 
 TESTS = Path(__file__).resolve().parents[2] / "tests"
 SEED = 20_261_121
@@ -27,10 +26,7 @@ def main() -> int:
     """Print the table; return 1 if anything escaped."""
     words = [int(word) for word in sys.argv[1:]]
     count, seed, first = words + [2000, SEED, 0][len(words) :]
-    print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores, python {platform.python_version()}, numpy {np.__version__}\n"
-    )
+    print(f"{machine()}\n")
     begin = time.perf_counter()
     answers = fuzzing.run(seed, range(first, first + count))
     wall = time.perf_counter() - begin

@@ -7,15 +7,13 @@ process of its own, so that the peak is that of these steps alone; prints a tabl
 """
 
 import json
-import os
-import platform
 import resource
 import subprocess
 import sys
 import time
 from pathlib import Path
 
-import numpy as np
+from benchmarks.machine import machine
 
 ROOT = Path(__file__).resolve().parents[2]
 NAME = "colin27_head_1mm.ply.gz"
@@ -32,10 +30,7 @@ def main() -> int:
         return 1
     run = [sys.executable, "-m", __spec__.name, "--measure", str(path)]
     done = subprocess.run(run, capture_output=True, text=True, check=True)
-    print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores; python {platform.python_version()}, numpy {np.__version__}\n"
-    )
+    print(f"{machine()}\n")
     rows, note = json.loads(done.stdout)
     print(f"{NAME}: {note}\n\n| step | wall [s] | CPU [s] | peak memory so far [GB] |")
     print("|---|---|---|---|")

@@ -12,8 +12,6 @@ is the processor's minute, over all threads, since wall time tells how busy the 
 is; a run that hangs without working is cut after ten minutes.
 """
 
-import os
-import platform
 import resource
 import subprocess
 import sys
@@ -23,8 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
-import numpy as np
-
+from benchmarks.machine import machine
 from tests.geometry.files import test_nasty
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -57,10 +54,7 @@ def main() -> int:
     """Print the table; return 1 if a file ended otherwise than it must."""
     table = test_nasty
     names = sys.argv[1:] or sorted(path.name for path in FOLDER.iterdir())
-    print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores, python {platform.python_version()}, numpy {np.__version__}\n"
-    )
+    print(f"{machine()}\n")
     print("| file | exit | processor [s] | wall [s] | how it ended |")
     print("|---|---|---|---|---|")
     counts: dict[str, int] = {}

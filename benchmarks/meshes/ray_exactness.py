@@ -9,8 +9,6 @@ below 1e-6 for edge-on, and misses small faces otherwise). Every false answer is
 by the cosine of incidence at which its ray meets the sample's face.
 """
 
-import os
-import platform
 import sys
 from collections.abc import Iterator
 from itertools import pairwise
@@ -20,6 +18,7 @@ import igl
 import numpy as np
 from support.plain_shapes import box, grid
 
+from benchmarks.machine import machine
 from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.visibility import Visibility
@@ -41,10 +40,7 @@ def main() -> int:
     """Print the table; return 0."""
     data = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT.parent / "shared" / "data"
     n = int(sys.argv[2]) if len(sys.argv) > 2 else 40_000
-    print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} cores"
-    )
-    print(f"python {platform.python_version()}, numpy {np.__version__}\n")
+    print(f"{machine()}\n")
     print("Each cell: rays, falsely blocked / falsely clear, by cosine of incidence.\n")
     print(
         "| mesh | cos 1e-4 to 1e-3 | 1e-3 to 1e-2 | above 1e-2 "

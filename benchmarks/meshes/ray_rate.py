@@ -11,7 +11,6 @@ brackets of processor times, which other work on the machine disturbs less.
 """
 
 import os
-import platform
 import sys
 import time
 from collections.abc import Callable
@@ -20,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.machine import machine
 from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import sample_surface
@@ -36,13 +36,7 @@ def main() -> int:
     """Print the tables; return 0."""
     data = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT.parent / "shared" / "data"
     rounds = int(sys.argv[2]) if len(sys.argv) > 2 else 7
-    print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} cores"
-    )
-    print(
-        f"python {platform.python_version()}, numpy {np.__version__}, "
-        f"load before the run {os.getloadavg()[0]:.1f}\n"
-    )
+    print(f"{machine()}, load before the run {os.getloadavg()[0]:.1f}\n")
     print(
         "| mesh, faces | raw [Mray/s] | raw, sorted [Mray/s] "
         "| matrix / raw | matrix / raw sorted | device by device / raw "

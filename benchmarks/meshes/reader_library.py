@@ -14,8 +14,6 @@ import contextlib
 import importlib.metadata
 import importlib.util
 import io
-import os
-import platform
 import sys
 from collections import Counter
 from pathlib import Path
@@ -24,6 +22,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from benchmarks.machine import machine
 from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import MeshError
 from tests.geometry.files import test_nasty
@@ -42,11 +41,7 @@ OUTCOMES = (
 def main() -> int:
     """Print the counts and the files that come out differently."""
     version = importlib.metadata.version("trimesh")
-    print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores, python {platform.python_version()}, numpy {np.__version__}, "
-        f"trimesh {version}\n"
-    )
+    print(f"{machine()}, trimesh {version}\n")
     nasty = test_nasty
     sets = {"traps": _traps(nasty)}
     if nasty.NASTY.is_dir():

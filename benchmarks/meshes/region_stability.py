@@ -19,8 +19,6 @@ surface, no answer can stay: how far the quarter lies off the mesh is printed as
 `qslim`, where the mesh is one that it takes (manifold).
 """
 
-import os
-import platform
 import sys
 from pathlib import Path
 
@@ -28,6 +26,7 @@ import fast_simplification
 import igl
 import numpy as np
 
+from benchmarks.machine import machine
 from geometry.curvature.curvature import principal_curvatures
 from geometry.curvature.refinement import cut_for_curvature
 from geometry.files.readers import load_mesh
@@ -56,10 +55,7 @@ def main() -> int:
     """Print the table; return 0."""
     data = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT.parent / "shared" / "data"
     wanted = sys.argv[2:]
-    print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores; python {platform.python_version()}, numpy {np.__version__}\n"
-    )
+    print(f"{machine()}\n")
     print(
         "| mesh | faces | regions | dominant | remeshed | quarter of the faces "
         "| noise along normals | noise in all directions | regions with noise "

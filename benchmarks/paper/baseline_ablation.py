@@ -24,7 +24,6 @@ Seconds are of processor time: drops, turns, program, cover, bound over all pose
 
 import json
 import os
-import platform
 import subprocess
 import sys
 import tempfile
@@ -37,6 +36,7 @@ from typing import Any
 import numpy as np
 from support import plain_shapes, shared_meshes
 
+from benchmarks.machine import machine
 from geometry.curvature.refinement import cut_for_curvature
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import sphere
@@ -124,10 +124,7 @@ def main() -> int:
         return _old(Path(sys.argv[2]), sys.argv[3])
     names = ["face.obj", *(m.path.name for m in shared_meshes.MESHES[1:])]
     names = sys.argv[1:] or [*names, *_SHAPES, *_OVERFLOWING]
-    print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores, python {platform.python_version()}, numpy {np.__version__}\n"
-    )
+    print(f"{machine()}\n")
     print(f"| {' | '.join(_HEAD)} |\n|{len(_HEAD) * '---|'}", flush=True)
     worse = 0
     with tempfile.TemporaryDirectory() as folder:

@@ -10,8 +10,6 @@ images; ambient light and lens distortion; and the planner's own single viewpoin
 sample.
 """
 
-import os
-import platform
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +17,7 @@ from pathlib import Path
 import numpy as np
 from support.reconstruction_rigs import single
 
+from benchmarks.machine import machine
 from geometry.files.readers import load_mesh
 from planning.experiments.ground_truth import (
     Errors,
@@ -239,9 +238,7 @@ def main() -> None:
     """Print every table."""
     print("# Section VII of the paper, simulated\n")
     print("Command: `python -m benchmarks.paper.paper_experiments`\n")
-    machine = f"{platform.machine()}, {os.cpu_count()} cores"
-    versions = f"python {platform.python_version()}, numpy {np.__version__}"
-    print(f"machine: {machine}, {versions}\n")
+    print(f"{machine()}\n")
     outcomes = every_cloud()
     rings(outcomes)
     second_sequences(outcomes)

@@ -12,14 +12,13 @@ passed; false claims that the audit found; processor time.
 """
 
 import argparse
-import os
-import platform
 import sys
 import time
 
 import numpy as np
 
 from benchmarks.bounds.continuous_bounds import jobs
+from benchmarks.machine import machine
 from geometry.files.readers import load_mesh
 from planning import RequirementError, RigPlan, load_rig, plan_rig
 from planning.rings.acquisition import n_frames
@@ -40,10 +39,7 @@ def main() -> int:
     lights = ("diverging", "parallel")
     parser.add_argument("--lights", nargs="+", default=lights[:1], choices=lights)
     given = parser.parse_args()
-    print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores, python {platform.python_version()}, numpy {np.__version__}\n"
-    )
+    print(f"{machine()}\n")
     print(f"| {' | '.join(HEAD)} |\n|{'---|' * len(HEAD)}")
     for path, options, up in jobs(given.names):
         mesh = load_mesh(path, **options)

@@ -10,8 +10,6 @@ own; the plan's own, by curvature; and two spacings of as many rings that know n
 cameras nor a widest gap, by sqrt(kappa) and by R^0.2 kappa^0.4 of the target.
 """
 
-import os
-import platform
 import sys
 import time
 from dataclasses import replace
@@ -19,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.machine import machine
 from geometry.files.readers import load_mesh
 from planning import RequirementError, load_rig, plan_rig
 from planning.model.planned import PlannedProjector
@@ -41,10 +40,7 @@ MM = 1e3
 
 def main() -> int:
     """Print the table; return 0."""
-    print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores, python {platform.python_version()}, numpy {np.__version__}\n"
-    )
+    print(f"{machine()}\n")
     print(
         "Distance of the lit surface from chords between rings, along the beam [mm].\n"
     )

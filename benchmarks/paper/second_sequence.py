@@ -14,8 +14,6 @@ is measurable with a point within half a gap of the first rings, and one; of a p
 within half of tau and tau.
 """
 
-import os
-import platform
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
@@ -24,6 +22,7 @@ from itertools import pairwise
 import numpy as np
 
 from benchmarks.bounds.continuous_bounds import jobs
+from benchmarks.machine import machine
 from geometry.files.readers import load_mesh
 from geometry.rays.rays import RayCaster
 from planning import RequirementError, RigPlan, load_rig, plan_rig
@@ -47,10 +46,7 @@ MM = 1e3
 
 def main() -> int:
     """Print the table; return 0."""
-    print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores, python {platform.python_version()}, numpy {np.__version__}\n"
-    )
+    print(f"{machine()}\n")
     print("| object | light | second rings | number | rms [mm] | 99 % | largest |")
     print("|---|---|---|---|---|---|---|")
     complete = [*experiments(), *plans(sys.argv[1:])]

@@ -14,8 +14,6 @@ Last come the median of devices saved and of the ratio of times; returns 1 if a 
 takes more devices than a greedy cover that meets what is asked.
 """
 
-import os
-import platform
 import sys
 import tempfile
 import time
@@ -27,6 +25,7 @@ from statistics import median
 import numpy as np
 
 from benchmarks.bounds.continuous_bounds import jobs
+from benchmarks.machine import machine
 from geometry.curvature.refinement import cut_for_curvature
 from geometry.mesh.mesh import TriangleMesh
 from planning import load_mesh, load_rig, plan_rig, read_mounted
@@ -96,10 +95,7 @@ def met(found: list[float]) -> tuple[bool, bool]:
 
 def main() -> int:
     """Print the table."""
-    print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores\n\n| {' | '.join(_HEAD)} |\n|{len(_HEAD) * '---|'}"
-    )
+    print(f"{machine()}\n\n| {' | '.join(_HEAD)} |\n|{len(_HEAD) * '---|'}")
     saved: list[float] = []
     ratios: list[float] = []
     worse = False

@@ -17,8 +17,6 @@ with the default rig and up to three projectors, each in the unit or size that
 Shares are of what is reachable by cameras. Last come the two figures over all meshes.
 """
 
-import os
-import platform
 import statistics
 import sys
 import time
@@ -27,6 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.bounds.continuous_bounds import jobs
+from benchmarks.machine import machine
 from geometry.curvature.refinement import cut_for_curvature
 from geometry.mesh.mesh import TriangleMesh
 from planning import load_mesh, load_rig, verify_plan
@@ -90,10 +89,7 @@ class Found:
 def main() -> int:
     """Print the table."""
     names = [word for word in sys.argv[1:] if word != "--check"]
-    print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores, python {platform.python_version()}, numpy {np.__version__}\n"
-    )
+    print(f"{machine()}\n")
     print(f"| {' | '.join(_HEAD)} |\n|{len(_HEAD) * '---|'}")
     found: list[Found] = []
     for path, options, up in jobs(names):

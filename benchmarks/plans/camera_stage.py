@@ -15,16 +15,14 @@ machine changes less; then the most memory that the process held, from start to 
 """
 
 import json
-import os
-import platform
 import resource
 import subprocess
 import sys
 import time
 
-import numpy as np
 from support import shared_meshes
 
+from benchmarks.machine import machine
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.sample_head.sample_head import sample_head
 from planning import RequirementError, load_mesh, load_rig
@@ -70,11 +68,7 @@ def main() -> int:
     """Print the table; return 0."""
     if sys.argv[1:2] == ["--measure"]:
         return _measure(*sys.argv[2:])
-    print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores, {_THREADS} threads, python {platform.python_version()}, "
-        f"numpy {np.__version__}\n"
-    )
+    print(f"{machine()}, {_THREADS} threads\n")
     print(
         "| mesh | faces | light | cameras | cover and routes [s] | baselines [s] "
         "| stage [s] | rings [s] | bounds [s] | stage [CPU s] | rings [CPU s] "

@@ -25,8 +25,6 @@ crashes.
 
 import argparse
 import copy
-import os
-import platform
 import subprocess
 import sys
 import tempfile
@@ -39,6 +37,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.machine import machine
 from planning import RigPlan
 from planning.cli.checks.planned_again import PlannedAgain
 from planning.cli.other_commands import write_sample
@@ -108,8 +107,7 @@ def main() -> int:
                 _note(ended, let_by, kind, f"{what}: {how}", how)
     n = sum(map(len, kinds.values()))
     print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores; {n} leaves of {len(kinds)} kinds, seed {asked.seed}, "
+        f"{machine()}; {n} leaves of {len(kinds)} kinds, seed {asked.seed}, "
         f"{time.perf_counter() - begin:.0f} s\n"
     )
     return int(_print(ended, let_by))

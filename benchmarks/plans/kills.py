@@ -20,7 +20,6 @@ the folder is cleaned up. Prints a table; returns 1 if anything isn't so.
 import argparse
 import json
 import os
-import platform
 import shutil
 import signal
 import subprocess
@@ -35,6 +34,7 @@ import numpy as np
 import trimesh
 from PIL import Image
 
+from benchmarks.machine import machine
 from planning import RigPlan, verify_plan
 from planning.cache.entries import FolderEntries
 from planning.verify.reconstruction.check.cloud_file import is_cloud
@@ -85,10 +85,7 @@ def main() -> int:
     parser.add_argument("--moments", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
-    print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores, moments of seed {options.seed}\n"
-    )
+    print(f"{machine()}, moments of seed {options.seed}\n")
     with tempfile.TemporaryDirectory() as name:
         place = Path(name)
         (place / "front.toml").write_text(RIG)

@@ -12,8 +12,6 @@ recomputes (in points of the target's or surface's area), and the seconds of eve
 stage.
 """
 
-import os
-import platform
 import statistics
 import subprocess
 import sys
@@ -25,6 +23,7 @@ from pathlib import Path
 import numpy as np
 from support import shared_meshes
 
+from benchmarks.machine import machine
 from planning import RigPlan
 from planning.verify.audit.audit import audit_plan
 
@@ -35,10 +34,7 @@ RUN = [sys.executable, "-c", "from planning.cli.main import main; main()"]
 
 def main() -> int:
     """Print the tables; return 1 if a run ended without a documented exit code."""
-    print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores, python {platform.python_version()}, numpy {np.__version__}\n"
-    )
+    print(f"{machine()}\n")
     print("`plan --help`, median of 5:", f"{_help_seconds():.2f} s\n")
     print(
         "| mesh | light | exit | faces | longest side [mm] | regions | wall [s] "

@@ -13,8 +13,6 @@ calls lit, and the margins of what is lit: the least, and that at the required s
 """
 
 import argparse
-import os
-import platform
 import sys
 import time
 from dataclasses import replace
@@ -22,6 +20,7 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.bounds.continuous_bounds import jobs, ready_for
+from benchmarks.machine import machine
 from geometry.curvature.refinement import cut_for_curvature
 from geometry.files.readers import load_mesh
 from planning.model.device_poses import moved_to, rounded_pose
@@ -46,10 +45,7 @@ STREAM = 800
 def main() -> int:
     """Print the table; return 1 if a sample said to be lit breaks a limit."""
     given = _arguments()
-    print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores, python {platform.python_version()}, numpy {np.__version__}\n"
-    )
+    print(f"{machine()}\n")
     print(
         "| mesh | faces | light | projectors | lit samples | break a limit | only by "
         "the audit | least margin | at the share | stage [s] |\n"

@@ -10,8 +10,6 @@ poses of widest margin, and their sum; then processor seconds of cover and bound
 all threads, which a busy machine changes less.
 """
 
-import os
-import platform
 import sys
 import time
 from collections.abc import Iterator
@@ -19,6 +17,7 @@ from collections.abc import Iterator
 import numpy as np
 from support import shared_meshes
 
+from benchmarks.machine import machine
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.sample_head.sample_head import sample_head
 from planning import load_mesh, load_rig
@@ -54,11 +53,7 @@ class _Clock:
 
 def main() -> int:
     """Print the table."""
-    print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores, {_THREADS} threads, python {platform.python_version()}, "
-        f"numpy {np.__version__}\n"
-    )
+    print(f"{machine()}, {_THREADS} threads\n")
     print(
         "| mesh | faces | light | cover [s] | bounds [s] | poses [s] | stage [s] "
         "| cover [CPU s] | bounds [CPU s] |"

@@ -14,8 +14,6 @@ find on the matrix of the checker with one device fewer, each in ten times what
 """
 
 import argparse
-import os
-import platform
 import subprocess
 import sys
 import tempfile
@@ -28,6 +26,7 @@ from pathlib import Path
 import numpy as np
 from support import shared_meshes, small_job
 
+from benchmarks.machine import machine
 from geometry.arrays import Mask
 from planning.model.plan import RigPlan
 from planning.proofs.selection import cover_problem
@@ -59,10 +58,7 @@ def main() -> int:
     options.add_argument("--plans", type=int, default=20)
     options.add_argument("--few", action="store_true")
     given = options.parse_args()
-    print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores, python {platform.python_version()}, numpy {np.__version__}\n"
-    )
+    print(f"{machine()}\n")
     print(f"| {' | '.join(_HEAD)} |\n|{len(_HEAD) * '---|'}", flush=True)
     wrong = 0
     with tempfile.TemporaryDirectory() as folder:

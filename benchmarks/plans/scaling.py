@@ -11,8 +11,6 @@ and the exponents: slopes of log time against log size, over all sizes and from 
 the next at the end.
 """
 
-import os
-import platform
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -21,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.machine import machine
 from planning.cli.other_commands import write_sample
 
 from .speed import ROOT, timed_run
@@ -55,9 +54,7 @@ def main() -> int:
     words = sys.argv[1:]
     most = next((int(word) for word in words if word.isdigit()), _FACES[-1])
     kinds = [word for word in words if not word.isdigit()] or ["faces", "candidates"]
-    print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} cores"
-    )
+    print(machine())
     for kind in kinds:
         sizes = _FACES if kind == "faces" else _CANDIDATES
         parts = ("to the plan", "to the end", *_STAGES)

@@ -12,8 +12,6 @@ comes near: both are compared.
 """
 
 import argparse
-import os
-import platform
 import sys
 import time
 from collections.abc import Iterator
@@ -21,6 +19,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from benchmarks.bounds.continuous_bounds import jobs, ready_for
+from benchmarks.machine import machine
 from geometry.curvature.refinement import cut_for_curvature
 from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
@@ -38,10 +37,7 @@ from planning.scene.limits import projector_limits
 def main() -> int:
     """Print the tables."""
     given = _arguments()
-    print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores, python {platform.python_version()}, numpy {np.__version__}\n"
-    )
+    print(f"{machine()}\n")
     _print_margins(given)
     return 0
 

@@ -17,7 +17,6 @@ run says of itself. Returns 1 if one isn't.
 import argparse
 import json
 import os
-import platform
 import shutil
 import subprocess
 import sys
@@ -31,6 +30,7 @@ from typing import Any
 
 from support import shared_meshes
 
+from benchmarks.machine import machine
 from planning.cli.other_commands import write_sample
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -62,10 +62,7 @@ def main() -> int:
     parser.add_argument("names", nargs="*", default=_NAMES)
     asked = parser.parse_args()
     runs, others = asked.runs, _OTHERS[: asked.others]
-    print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores; medians of {runs} runs\n"
-    )
+    print(f"{machine()}; medians of {runs} runs\n")
     print(
         "| mesh | asked | stands [s] | ends [s] | CPU [s] | peak [GB] | of the first "
         "| same plan |\n" + 8 * "|---" + "|"

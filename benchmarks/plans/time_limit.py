@@ -14,7 +14,6 @@ on a machine that is shared.
 
 import argparse
 import os
-import platform
 import subprocess
 import sys
 import tempfile
@@ -23,6 +22,7 @@ from pathlib import Path
 
 from support import shared_meshes
 
+from benchmarks.machine import machine
 from planning import RigPlan
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -47,8 +47,7 @@ def main() -> int:
     parser.add_argument("names", nargs="*")
     options = parser.parse_args()
     print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores, {options.busy} more processes at work, load when it began "
+        f"{machine()}, {options.busy} more processes at work, load when it began "
         f"{os.getloadavg()[0]:.1f}\n"
     )
     print("| mesh | asked [s] | taken [s] | ratio | exit | first line |")

@@ -19,8 +19,6 @@ What a run misses, and what would help, is listed below the table.
 """
 
 import json
-import os
-import platform
 import resource
 import subprocess
 import sys
@@ -29,8 +27,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from support import shared_meshes
+
+from benchmarks.machine import machine
 
 ROOT = Path(__file__).resolve().parents[2]
 RUN = [sys.executable, "-c", "from planning.cli.main import main; main()"]
@@ -60,10 +59,7 @@ def main() -> int:
     while words and words[0].startswith("--"):
         options += words[:2]
         words = words[2:]
-    print(
-        f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
-        f"cores, python {platform.python_version()}, numpy {np.__version__}\n"
-    )
+    print(f"{machine()}\n")
     print(f"| {' | '.join(_HEAD)} |\n|{len(_HEAD) * '---|'}")
     missed: list[str] = []
     undocumented = 0
