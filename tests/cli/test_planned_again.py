@@ -46,10 +46,12 @@ def plan(folder):
 
 
 @pytest.fixture(scope="module")
-def made(folder, plan):
+def made(folder, plan, tmp_path_factory):
+    """From files that lie elsewhere, by two threads."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(folder)
-        return PlannedAgain(plan, None, quiet=True)(plan, 2)
+        patch.chdir(tmp_path_factory.mktemp("elsewhere"))
+        mesh, rig = folder / "head.obj", folder / "few.toml"
+        return PlannedAgain(plan, mesh, str(rig), quiet=True)(plan, 2)
 
 
 def held(plan, made, change):

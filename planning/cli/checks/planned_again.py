@@ -28,12 +28,15 @@ class PlannedAgain:
     Args:
         plan: The plan, as written; its members are known, too.
         mesh: The mesh to plan; None: the one that the command names.
+        rig: Likewise the rig, a preset or a file.
         quiet: Whether nothing is told on the way.
     """
 
-    def __init__(self, plan: RigPlan, mesh: Path | None, *, quiet: bool) -> None:
+    def __init__(
+        self, plan: RigPlan, mesh: Path | None, rig: str | None = None, *, quiet: bool
+    ) -> None:
         self._plan, self._quiet = plan, quiet
-        self._options = _options(plan, mesh)
+        self._options = _options(plan, mesh, rig)
         self._made: RigPlan | None = None
 
     def __call__(self, plan: RigPlan, threads: int) -> Mapping[str, Any]:
@@ -66,7 +69,7 @@ class PlannedAgain:
             return RigPlan.load(Path(folder) / "plan" / "plan.json")
 
 
-def _options(plan: RigPlan, mesh: Path | None) -> dict[str, Any]:
+def _options(plan: RigPlan, mesh: Path | None, rig: str | None) -> dict[str, Any]:
     """Return the options that a plan's command has.
 
     Raises:
@@ -81,6 +84,7 @@ def _options(plan: RigPlan, mesh: Path | None) -> dict[str, Any]:
         options = declared.make_context("plan", list(words[1 + stands :])).params
         if mesh is not None:
             options |= {"meshes": (str(mesh),), "files": ()}
+        options |= {} if rig is None else {"rig_name": rig}
         if stands:
             as_of_plans(options)
         else:

@@ -37,7 +37,9 @@ def verify_command(options: Mapping[str, Any]) -> int:
     threads = options["threads"] or n_threads()
     again = again_or_why_not
     if options["replan"]:
-        again = PlannedAgain(plan, options["mesh"], quiet=options["quiet"])
+        again = PlannedAgain(
+            plan, options["mesh"], options["rig"], quiet=options["quiet"]
+        )
     with progress(quiet=options["quiet"]) as report:
         verification = verify_plan(
             plan,

@@ -62,12 +62,19 @@ _SECTIONS = {
     help="Plan again from the words of the plan's command, and hold every figure to "
     "the last digit; as long as planning took.",
 )
+@click.option(
+    "--rig",
+    metavar="NAME|FILE",
+    help="With --replan, the rig in place of the command's.",
+)
 @rendering_options
 @threads_option
 @output_options
 def verify(**options: Any) -> None:  # noqa: ANN401
     """Recompute every claim from the files alone, then check from pixels."""
     check_rendering(options)
+    if options["rig"] is not None and not options["replan"]:
+        raise click.UsageError("--rig is what --replan plans with: give both")
     from planning.cli.checks.verify_command import verify_command
 
     run(lambda: verify_command(options), debug=options["debug"])
