@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.arrays import Array, Ints, Mask
+from geometry.arrays import Array, Ints, Mask, lengths
 from geometry.rays.rays import CHUNK, equal_parts
 from geometry.rays.visibility import Visibility
 
@@ -190,7 +190,7 @@ def _arcs_come_within(cube: CubeMap, axes: Array, cells: Ints, cosine: float) ->
     near = np.zeros(cells.size, dtype=bool)
     for start, end in zip(corners, corners[1:] + corners[:1], strict=True):
         pole = np.cross(start, end)
-        pole /= np.linalg.norm(pole, axis=1)[:, None]
+        pole /= lengths(pole)[:, None]
         off = np.einsum("ij,ij->i", pole, axes)
         # The nearest point of the great circle lies between the ends.
         between = np.einsum("ij,ij->i", np.cross(pole, start), axes) > 0.0

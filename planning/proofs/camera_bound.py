@@ -18,11 +18,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import lengths
 from geometry.devices import PinholeModel
 from geometry.directions.cube_map import CubeMap
 from geometry.directions.open_directions import DirectionLimits
 from geometry.directions.widened_maps import WidenedMaps
-from geometry.mesh.tensors import lengths
 from planning.proofs.cells.aim_cells import AimTree
 from planning.proofs.cells.direction_cells import mesh_reach, open_samples
 from planning.proofs.cells.image_cone import image_cone

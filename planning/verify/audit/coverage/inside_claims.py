@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from geometry.arrays import Array, Mask
-from geometry.mesh.tensors import lengths
+from geometry.arrays import Array, Mask, lengths
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.audit_samples import AuditSamples

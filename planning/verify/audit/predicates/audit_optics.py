@@ -6,9 +6,8 @@ numerically: an error of sign or of order shows as a difference of areas.
 
 import numpy as np
 
-from geometry.arrays import Array, Mask, cross
+from geometry.arrays import Array, Mask, cross, lengths
 from geometry.devices import PinholeModel
-from geometry.mesh.tensors import lengths
 
 _STEP = 1e-5
 _INVERSIONS = 30

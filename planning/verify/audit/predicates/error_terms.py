@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.arrays import Array, cross
-from geometry.mesh.tensors import lengths
+from geometry.arrays import Array, cross, lengths
 from planning.model.light.dense_code import DenseCode
 from planning.model.light.drawn_edges import DrawnEdges
 from planning.model.light.light_budget import LightBudget
