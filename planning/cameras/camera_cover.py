@@ -164,7 +164,7 @@ def _surely_enough(
     floors = RegionFloors.of(scene, lit.target, "camera")
     reached = np.ones(len(lit.target), dtype=bool)
     quotas = Quotas.of(floors, reached, scene.requirements.coverage)
-    return quotas.enough(measured.any(axis=1))
+    return quotas.enough(np.any(measured, axis=1))
 
 
 def measured_samples(
