@@ -26,6 +26,19 @@ def cross(a: Array, b: Array) -> Array:
     return product
 
 
+def lengths(vectors: Array) -> Array:
+    """Return sqrt(x^2 + y^2 + ...) of each row, (..., k) to (...), k small.
+
+    To the last bit what `np.linalg.norm` gives along the last axis, whose sums over
+    rows of three cost five times as much, and up to thirty.
+    """
+    first, *others = np.moveaxis(vectors, -1, 0)
+    square = first * first
+    for other in others:
+        square += other * other
+    return np.sqrt(square)
+
+
 def rows_of(array: NDArray[_Kind], chosen: Ints | Mask) -> NDArray[_Kind]:
     """Return some rows, by index or mask: up to ten times as fast as `array[chosen]`.
 

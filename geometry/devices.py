@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from geometry.arrays import lengths
+
 from .arrays import Array, Length, Mask
 
 _UNDISTORT_STEPS = 12
@@ -155,7 +157,7 @@ class PinholeModel:
         rays = np.concatenate(
             [normalised, np.ones((*normalised.shape[:-1], 1))], axis=-1
         )
-        return rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+        return rays / lengths(rays)[..., None]
 
     def ray_jacobian(self, points: Array) -> Array:
         """Return J_r = dr/d(u, v) in [1/px] at points in the device frame, (n, 3, 2).

@@ -10,6 +10,8 @@ Device frames are right-handed with +x right, +y down and +z along the optical a
 
 import numpy as np
 
+from geometry.arrays import lengths
+
 from .arrays import Array
 
 
@@ -32,7 +34,7 @@ def look_at(positions: Array, targets: Array, up: Array, *, roll: float = 0.0) -
         np.asarray(positions, dtype=np.float64), np.asarray(targets, dtype=np.float64)
     )
     z = targets - positions
-    length = np.linalg.norm(z, axis=-1, keepdims=True)
+    length = lengths(z)[..., None]
     if not np.all(length > 0):
         raise ValueError("a target coincides with its position: no viewing direction")
     z = z / length
@@ -40,7 +42,7 @@ def look_at(positions: Array, targets: Array, up: Array, *, roll: float = 0.0) -
     spare = np.eye(3)[np.argmin(np.abs(up))]
     along = np.abs(z @ up)[..., None] > 1.0 - 1e-9
     x = np.cross(z, np.where(along, spare, up))
-    x = x / np.linalg.norm(x, axis=-1, keepdims=True)
+    x = x / lengths(x)[..., None]
     y = np.cross(z, x)
     c, s = np.cos(roll), np.sin(roll)
     poses = np.zeros((*z.shape[:-1], 4, 4))

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from geometry.arrays import Array, Ints, Mask
+from geometry.arrays import Array, Ints, Mask, lengths
 from geometry.mesh.diffusion import diffused
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.tensors import cross, principal, tangent_planes, unpacked
@@ -97,12 +97,12 @@ def facet_size(mesh: TriangleMesh) -> float:
     edges = mesh.edges
     pairs, edge = face_pairs(edges)
     normals = mesh.face_normals[pairs]
-    sine = np.linalg.norm(cross(normals[:, 0], normals[:, 1]), axis=1)
+    sine = lengths(cross(normals[:, 0], normals[:, 1]))
     turn = np.arctan2(sine, np.einsum("ij,ij->i", normals[:, 0], normals[:, 1]))
     # Below, it is the rounding of flat surface.
     turn[(turn > _SHARPEST_FACET) | (turn < _LEAST_TURN)] = 0.0
     ends = mesh.vertices[edges.ends[edge]]
-    length = turn @ np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    length = turn @ lengths(ends[:, 1] - ends[:, 0])
     area = turn @ mesh.face_areas[pairs].sum(axis=1)
     return float(area / length) if length > 0 else 0.0
 
@@ -179,13 +179,13 @@ def _near_border(vertices: Array, edges: MeshEdges, reach: float, rings: int) ->
         return near
     count, loop = components(rim, n)
     a, b = edges.ends.T
-    lengths = np.linalg.norm(vertices[a] - vertices[b], axis=1)
-    around = np.bincount(loop[rim[:, 0]], lengths[edges.border], count)
+    run = lengths(vertices[a] - vertices[b])
+    around = np.bincount(loop[rim[:, 0]], run[edges.border], count)
     long = around > 2.0 * np.pi * reach
     sources = np.unique(rim[long[loop[rim[:, 0]]]])
     if len(sources) == 0:
         return near
-    graph = coo_array((lengths, (a, b)), (n, n)).tocsr()
+    graph = coo_array((run, (a, b)), (n, n)).tocsr()
     distance = dijkstra(
         graph, directed=False, indices=sources, min_only=True, limit=reach
     )

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import igl
 import numpy as np
 
-from geometry.arrays import Array, Ints, Mask
+from geometry.arrays import Array, Ints, Mask, lengths
 from geometry.mesh.tensors import area_normals, cross, packed, summed, unit
 from geometry.mesh.topology import numbered
 
@@ -41,7 +41,7 @@ def fit_quadrics(vertices: Array, faces: Ints) -> tuple[Array, Array, Mask, Mask
     k[:, ~sensible] = 0.0
     # An exactly flat neighbourhood has no direction of its own, hence no normal.
     normals = cross(ways[0], ways[1])
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    length = lengths(normals)[:, None]
     normals = np.where(
         length > 0.5,
         normals / np.maximum(length, 0.5),
@@ -100,7 +100,7 @@ def _shortest_edges(vertices: Array, faces: Ints) -> Array:
     shortest = np.full(len(vertices), np.inf)
     for a, b in ((0, 1), (1, 2), (2, 0)):
         edge = vertices[faces[:, a]] - vertices[faces[:, b]]
-        length = np.linalg.norm(edge, axis=1)
+        length = lengths(edge)
         np.minimum.at(shortest, faces[:, a], length)
         np.minimum.at(shortest, faces[:, b], length)
     return shortest
@@ -117,7 +117,7 @@ def _with_normals(vertices: Array, faces: Ints) -> Ints:
     """Leave out faces at vertices whose normals cancel: libigl crashes there."""
     while len(faces):
         weighted = area_normals(vertices[faces])
-        size = np.linalg.norm(weighted, axis=1)
+        size = lengths(weighted)
         each = np.repeat(np.column_stack([weighted, size]), 3, axis=0)
         sums = summed(each, faces.ravel(), len(vertices)).T
         length = np.linalg.norm(sums[:3], axis=0)

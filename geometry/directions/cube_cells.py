@@ -159,10 +159,13 @@ def pieces(marks: Mask, n: int) -> Pieces:
     joined with the runs of the next row that they touch: there are far fewer runs than
     cells.
     """
-    rows = np.ascontiguousarray(marks).reshape(-1, n)
-    begins, ends = rows.copy(), rows.copy()
-    begins[:, 1:] &= ~rows[:, :-1]
-    ends[:, :-1] &= ~rows[:, 1:]
+    flat = np.ascontiguousarray(marks).ravel()
+    # All cells as one row first: rows are too short for numpy's loops.
+    begins, ends = flat.copy(), flat.copy()
+    np.greater(flat[1:], flat[:-1], out=begins[1:])
+    np.greater(flat[:-1], flat[1:], out=ends[:-1])
+    begins[::n] = flat[::n]
+    ends[n - 1 :: n] = flat[n - 1 :: n]
     start, stop = np.flatnonzero(begins), np.flatnonzero(ends)
     # Runs of the next row whose last cell isn't before, and first cell isn't behind.
     low = np.searchsorted(stop, start + n)

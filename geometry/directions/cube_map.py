@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from geometry.arrays import Array, Ints
+from geometry.arrays import Array, Ints, lengths
 
 # Rows: the world axes that a face's x, y and z run along.
 _AXES = np.array([[1, 2, 0], [1, 2, 0], [2, 0, 1], [2, 0, 1], [0, 1, 2], [0, 1, 2]])
@@ -237,5 +237,5 @@ def face_coordinates(vectors: Array, face: int) -> tuple[Array, Array, Array]:
 
 def angle_between(a: Array, b: Array) -> Array:
     """Return the angle between unit vectors, accurate for small ones too."""
-    chord = np.linalg.norm(a - b, axis=-1)
+    chord = lengths(a - b)
     return 2.0 * np.arcsin(np.clip(0.5 * chord, 0.0, 1.0))

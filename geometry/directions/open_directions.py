@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.arrays import Array, Ints, Mask
+from geometry.arrays import Array, Ints, Mask, cross, lengths
 from geometry.rays.rays import CHUNK, equal_parts
 from geometry.rays.visibility import Visibility
 
@@ -189,12 +189,12 @@ def _arcs_come_within(cube: CubeMap, axes: Array, cells: Ints, cosine: float) ->
     ]
     near = np.zeros(cells.size, dtype=bool)
     for start, end in zip(corners, corners[1:] + corners[:1], strict=True):
-        pole = np.cross(start, end)
-        pole /= np.linalg.norm(pole, axis=1)[:, None]
+        pole = cross(start, end)
+        pole /= lengths(pole)[:, None]
         off = np.einsum("ij,ij->i", pole, axes)
         # The nearest point of the great circle lies between the ends.
-        between = np.einsum("ij,ij->i", np.cross(pole, start), axes) > 0.0
-        between &= np.einsum("ij,ij->i", np.cross(end, pole), axes) > 0.0
+        between = np.einsum("ij,ij->i", cross(pole, start), axes) > 0.0
+        between &= np.einsum("ij,ij->i", cross(end, pole), axes) > 0.0
         best = np.where(between, np.sqrt(np.maximum(1.0 - off * off, 0.0)), -1.0)
         near |= np.maximum(best, np.einsum("ij,ij->i", start, axes)) >= cosine
     return near

@@ -17,9 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.arrays import Array, Ints, Mask, Words
+from geometry.arrays import Array, Ints, Mask, Words, lengths
 from geometry.mesh.mesh import TriangleMesh
-from geometry.mesh.tensors import lengths
 from geometry.mesh.topology import MeshEdges, face_pairs
 from geometry.rays.proximity import triangle_distances
 
@@ -81,7 +80,7 @@ class Silhouettes:
         self._smooth = np.sort(np.concatenate([f * n + g, g * n + f, [-1]]))
         self._centroids = mesh.face_centroids - self._middle
         spokes = mesh.corners - mesh.face_centroids[:, None]
-        self._radii = np.linalg.norm(spokes, axis=2).max(axis=1)
+        self._radii = lengths(spokes).max(axis=1)
         size = float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
         self._unsure = _UNSURE * size
         self._balls: dict[float, ProductSigns] = {}
@@ -182,7 +181,7 @@ class Silhouettes:
         other = face != faces[owner]
         face, owner = face[other], owner[other]
         # In the plane of a face, a circle about it leaves few to be looked at.
-        away = np.linalg.norm(self._centroids[face] - local[owner], axis=1)
+        away = lengths(self._centroids[face] - local[owner])
         close = away <= self._radii[face] + reach
         face, owner = face[close], owner[close]
         corners = self._vertices[self._faces[face]]

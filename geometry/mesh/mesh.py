@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from geometry.arrays import Array, Ints, Mask
+from geometry.arrays import Array, Ints, Mask, lengths
 
 from .diffusion import surface_laplacian
 from .extent import enclosing_ball, main_bodies
@@ -129,7 +129,7 @@ class TriangleMesh:
     @cached_property
     def face_areas(self) -> Array:
         """Area of each face in [m²], shape (n_f,)."""
-        return _read_only(0.5 * np.linalg.norm(self._cross, axis=1))
+        return _read_only(0.5 * lengths(self._cross))
 
     @cached_property
     def face_normals(self) -> Array:
@@ -209,7 +209,7 @@ class TriangleMesh:
     @cached_property
     def reach(self) -> float:
         """Largest distance in [m] of any face, fragments too, from `centre`."""
-        return float(np.linalg.norm(self.corners - self.centre, axis=2).max())
+        return float(lengths(self.corners - self.centre).max())
 
     @cached_property
     def mean_edge(self) -> float:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import igl
 import numpy as np
 
-from geometry.arrays import Array, Ints
+from geometry.arrays import Array, Ints, lengths
 from geometry.mesh.mesh import TriangleMesh
 
 
@@ -63,7 +63,7 @@ def triangle_distances(points: Array, corners: Array) -> Array:
     Unlike trimesh's closest points, exact on slivers of CAD parts too.
     """
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(normals, axis=1)
+    length = lengths(normals)
     normals /= np.where(length > 0, length, 1.0)[:, None]
     height = np.einsum("ij,ij->i", points - corners[:, 0], normals)
     over = length > 0
@@ -74,6 +74,6 @@ def triangle_distances(points: Array, corners: Array) -> Array:
         square = np.einsum("ij,ij->i", along, along)
         share = np.einsum("ij,ij->i", off, along) / np.where(square > 0, square, 1.0)
         foot = np.clip(share, 0.0, 1.0)[:, None] * along
-        best = np.minimum(best, np.linalg.norm(off - foot, axis=1))
+        best = np.minimum(best, lengths(off - foot))
         over &= np.einsum("ij,ij->i", np.cross(along, off), normals) >= 0.0
     return np.where(over, np.minimum(best, np.abs(height)), best)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.arrays import Array, Ints, Mask
+from geometry.arrays import Array, Ints, Mask, lengths
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster, equal_parts
 
@@ -101,9 +101,9 @@ def spots_at(mesh: TriangleMesh, faces: Ints, points: Array) -> Spots:
     """Return spots at given points (n, 3) of faces (n,), each with an area."""
     a, b, c = _ordered_corners(mesh, faces)
     e1 = b - a
-    e1 = e1 / np.linalg.norm(e1, axis=1, keepdims=True)
+    e1 = e1 / lengths(e1)[:, None]
     e2 = np.cross(np.cross(e1, c - a), e1)
-    e2 = e2 / np.linalg.norm(e2, axis=1, keepdims=True)
+    e2 = e2 / lengths(e2)[:, None]
     turns = 2.0 * np.pi * np.modf((np.arange(len(faces)) + 0.5) * _R1)[0]
     frames = np.stack([e1, e2, mesh.face_normals[faces]], axis=1)
     return Spots(faces, points, frames, turns)
@@ -137,6 +137,8 @@ def look_out(
             + (side * height)[:, None] * normal[:, None]
         ).reshape(-1, 3)
         start = np.repeat(spots.points[part] + offset * normal, n_rays, axis=0)
-        hit, _ = caster.first_hits(start, along)
-        escaped[part] = (hit < 0).reshape(-1, n_rays).sum(axis=1)
+        # Farther than this from a point of the surface there is none of it.
+        beyond = np.full(len(along), 4.0 * caster.reach / caster.scale)
+        blocked = caster.occluded(start, along, beyond)
+        escaped[part] = (~blocked).reshape(-1, n_rays).sum(axis=1)
     return escaped

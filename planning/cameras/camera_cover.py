@@ -11,7 +11,7 @@ from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.words import stopped_words
 from planning.proofs.conflicts import Interference
 from planning.proofs.device_stock import DeviceStock
-from planning.proofs.quotas import RegionFloors
+from planning.proofs.quotas import Quotas, RegionFloors
 from planning.proofs.selection import CandidateCover, Selection, select_fewest
 from planning.scene.bodies.clearance import candidates_with_clearance
 from planning.scene.camera_views import CandidateViews
@@ -136,6 +136,8 @@ def confirmed_cover(
         if cover.selection.status == "infeasible":
             return cover
         fresh = scene.target_samples(DRAWS.fresh_cameras.later(attempt))
+        if _surely_enough(scene, projectors, cover, fresh):
+            return cover
         lit, seen = measured_of(scene, projectors, cover.candidates, fresh)
         offered = cover.candidates.cameras
         if candidate_cover(scene, seen, lit, offered).enough(cover.selection.chosen):
@@ -144,6 +146,25 @@ def confirmed_cover(
         samples = lit_samples(scene, projectors, target)
         measured = np.concatenate([measured, seen[:, : len(candidates.cameras)]])
     return choose(samples, measured)
+
+
+def _surely_enough(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    cover: CameraCover,
+    target: Target,
+) -> bool:
+    """Return whether what is measured is enough, whatever other candidates reach.
+
+    They reach no more than is lit, so most often none has to be looked at.
+    """
+    lit, measured = measured_of(
+        scene, projectors, CandidateViews(scene, cover.cameras), target
+    )
+    floors = RegionFloors.of(scene, lit.target, "camera")
+    reached = np.ones(len(lit.target), dtype=bool)
+    quotas = Quotas.of(floors, reached, scene.requirements.coverage)
+    return quotas.enough(np.any(measured, axis=1))
 
 
 def measured_samples(

@@ -154,10 +154,19 @@ def confirms(
     if scene.has_floors and more is not None:
         samples = merged(samples, more)
     lit = CandidateSet.over(scene, samples, tuple(projectors)).reached
+    share, floors = (
+        scene.requirements.dominant_coverage,
+        RegionFloors.of(scene, samples),
+    )
+
+    def enough(reached: NDArray[np.bool_]) -> bool:
+        if lit[:n].sum() < share * reached[:n].sum():
+            return False
+        return Quotas.of(floors, reached, 0.0, spare=_AIMED).enough(lit)
+
+    # Where it is enough of all there is, what candidates reach needn't be known.
+    if enough(np.ones(len(lit), dtype=bool)):
+        return True
     reached, dark = lit.copy(), samples.take(~lit)
     reached[~lit] = CandidateSet.over(scene, dark, candidates.projectors).reached
-    share = scene.requirements.dominant_coverage
-    if lit[:n].sum() < share * reached[:n].sum():
-        return False
-    floors = RegionFloors.of(scene, samples)
-    return Quotas.of(floors, reached, 0.0, spare=_AIMED).enough(lit)
+    return enough(reached)

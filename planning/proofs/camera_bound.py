@@ -18,11 +18,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import lengths
 from geometry.devices import PinholeModel
 from geometry.directions.cube_map import CubeMap
 from geometry.directions.open_directions import DirectionLimits
 from geometry.directions.widened_maps import WidenedMaps
-from geometry.mesh.tensors import lengths
 from planning.proofs.cells.aim_cells import AimTree
 from planning.proofs.cells.direction_cells import mesh_reach, open_samples
 from planning.proofs.cells.image_cone import image_cone
@@ -42,7 +42,7 @@ DEFAULT = Effort(
     finest=8, aims=None, maps=5, budget=2.5e9, shadows=3e8, most_samples=2000
 )
 # Of what is asked only to spare a search: rough cells, no shadows.
-ROUGH = replace(DEFAULT, shadows=0.0, budget=3e8)
+ROUGH = replace(DEFAULT, shadows=0.0, budget=1.2e9)
 PROVE = Effort(finest=9, aims=5, maps=7, budget=3e10, shadows=np.inf)
 
 

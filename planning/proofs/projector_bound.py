@@ -35,9 +35,13 @@ from solvers.cells.cell_bound import CellBound, CellStatus
 
 from .all_poses import BoundQuestion, ContinuousBound, Effort
 
+_Tree = DirectionTree | PositionTree
+
 DEFAULT = Effort(
     finest=8, maps=6, budget=3.5e9, shadows=3e8, most_samples=2000, starts=1
 )
+# Share of the work for a search without shadows, where they can be drawn.
+_FIRST = 0.3
 PROVE = Effort(finest=9, maps=7, budget=4e10, shadows=np.inf, offers=150, starts=4)
 
 
@@ -57,55 +61,74 @@ def bound_projectors(
     The samples are those that some candidate lights and no existing projector does;
     which of them each candidate lights, (k, n), guides the search.
     """
-    reach = mesh_reach(scene)
     if question.count <= 1:
         # What is required takes one, with shadows or without: no cell is looked at.
         effort = replace(effort, finest=0, maps=0, shadows=0.0)
-    shadows = bool(len(samples) * len(scene.mesh.faces) <= effort.shadows)
-    required = scene.requirements.projector
-    limits = DirectionLimits(required.max_incidence, required.min_tangent_angle)
-    workspace = scene.requirements.workspace
+    reach, near = mesh_reach(scene), scene.requirements.workspace.projector_radius_m[0]
     devices = [template.device for template in templates]
-    near = workspace.projector_radius_m[0]
     parallel = isinstance(devices[0], ParallelModel)
     # How far off a device's own axis what it lights may be.
     widest = max(light_of(device).image_ring(0.0) for device in devices)
     aside = reach + widest if parallel else 0.0
     depth = float(np.sqrt(max(0.0, near**2 - aside**2)))
+    shadows = bool(len(samples) * len(scene.mesh.faces) <= effort.shadows)
     shadows = shadows and bool(depth >= reach)
-    cube = CubeMap(1 << effort.maps)
-    opened = open_samples(
-        scene, limits, samples, cube, shadows=shadows, nearest_m=depth
-    )
-    tree: DirectionTree | PositionTree
-    if parallel:
-        opened[~_within(cube, workspace, aside)] = 0
-        tree = DirectionTree.over(opened, len(samples))
-    else:
-        tree = PositionTree(
-            workspace,
-            workspace.projector_radius_m,
-            (
-                min(device.range_m[0] for device in devices),
-                max(device.range_m[1] for device in devices),
-            ),
-            samples.samples.points,
-            WidenedMaps(opened, cube),
-            finest=effort.finest,
-            closed=WidenedMaps(~opened, cube),
-            limits=LitCells(samples, required),
+
+    def searched(effort: Effort, *, shadows: bool) -> tuple[CellBound, _Tree]:
+        cube = CubeMap(1 << effort.maps)
+        required = scene.requirements.projector
+        limits = DirectionLimits(required.max_incidence, required.min_tangent_angle)
+        opened = open_samples(
+            scene, limits, samples, cube, shadows=shadows, nearest_m=depth
         )
-    bound = question.searched(tree, effort.budget, known)
+        if parallel:
+            opened[~_within(cube, scene.requirements.workspace, aside)] = 0
+            tree = DirectionTree.over(opened, len(samples))
+        else:
+            tree = _positions(scene, templates, samples, effort, opened)
+        return question.searched(tree, effort.budget, known), tree
+
+    # Shadows cost most, and what is proved without them holds with them.
+    first = effort
+    if shadows:
+        maps, budget = max(0, effort.maps - 1), _FIRST * effort.budget
+        first = replace(effort, maps=maps, budget=budget)
+    bound, tree = searched(first, shadows=False)
+    if shadows and bound.status is not CellStatus.PROVED:
+        among = searched(effort, shadows=True)
+        # Cut short, a longer search may have proved less.
+        if among[0].lower_bound >= bound.lower_bound:
+            bound, tree = among
     unrefuted = np.empty((0, 3))
     if bound.status in (CellStatus.SURVIVED, CellStatus.CUT):
         unrefuted = _promising(bound, tree, effort.offers)
-    shadows = shadows or question.count <= 1
+    shadows = shadows or bound.status is CellStatus.PROVED
     return ContinuousBound(question, bound, shadows, unrefuted)
 
 
-def _promising(
-    bound: CellBound, tree: DirectionTree | PositionTree, n: int
-) -> NDArray[np.float64]:
+def _positions(
+    scene: Scene,
+    templates: Sequence[PlannedProjector],
+    samples: Target,
+    effort: Effort,
+    opened: NDArray[np.uint64],
+) -> PositionTree:
+    """Return the cells of positions, for the directions open to samples as bit rows."""
+    workspace, cube = scene.requirements.workspace, CubeMap(1 << effort.maps)
+    ranges = [template.device.range_m for template in templates]
+    return PositionTree(
+        workspace,
+        workspace.projector_radius_m,
+        (min(least for least, _ in ranges), max(most for _, most in ranges)),
+        samples.samples.points,
+        WidenedMaps(opened, cube),
+        finest=effort.finest,
+        closed=WidenedMaps(~opened, cube),
+        limits=LitCells(samples, scene.requirements.projector),
+    )
+
+
+def _promising(bound: CellBound, tree: _Tree, n: int) -> NDArray[np.float64]:
     """Return the directions of cells that weren't refuted, and of n more.
 
     In these a projector would save most, by the multipliers.

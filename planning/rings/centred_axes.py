@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import lengths
 from geometry.mesh.extent import enclosing_ball
 from geometry.poses import inverse, transform
 from planning.model.planned import PlannedProjector
@@ -55,7 +56,7 @@ def _middle(light: Light, local: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return a ring frame whose axis is in the middle of points of the device."""
     frame = np.eye(4)
     if light.common_direction(frame) is None:
-        rays = local / np.linalg.norm(local, axis=1)[:, None]
+        rays = local / lengths(local)[:, None]
         centre, _ = enclosing_ball(rays)
         frame[:3, 2] = centre / np.linalg.norm(centre)
     else:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import lengths
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.topology import face_pairs
 from planning.model.planned import PlannedProjector
@@ -37,7 +38,7 @@ def find_creases(mesh: TriangleMesh, step: float) -> Creases:
     one, other = mesh.face_normals[pairs[:, 0]], mesh.face_normals[pairs[:, 1]]
     sharp = np.einsum("ij,ij->i", one, other) < np.cos(_SHARPEST_FACET)
     ends = mesh.vertices[mesh.edges.ends[edge[sharp]]]
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    length = lengths(ends[:, 1] - ends[:, 0])
     n = np.maximum(1, np.ceil(length / step).astype(np.int64))
     which = np.repeat(np.arange(len(n)), n)
     place = np.arange(len(which)) - np.repeat(np.cumsum(n) - n, n)

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import lengths
 from geometry.devices import DeviceModel, ParallelModel, PinholeModel
-from geometry.mesh.tensors import lengths
 from solvers.poses.axis_program import axis_direction
 
 _Array = NDArray[np.float64]
@@ -88,7 +88,7 @@ class DivergingLight:
     def ring_rays(self, frame: _Array, flat: _Array) -> tuple[_Array, _Array]:
         """Return apex (3,) and unit rays (n, 3) at ring coordinates (n, 2)."""
         local = np.column_stack([flat, np.ones(len(flat))])
-        local /= np.linalg.norm(local, axis=1, keepdims=True)
+        local /= lengths(local)[:, None]
         return frame[:3, 3], local @ frame[:3, :3].T
 
     def ring_offset(self, tilt: float, standoff: float) -> float:
@@ -126,7 +126,7 @@ class DivergingLight:
             self.device.project(ray @ device_from_ring[:3, :3].T)
             for ray in (rays, rays + _STEP * spoke)
         )
-        rate = np.linalg.norm(beyond - image, axis=2) / _STEP
+        rate = lengths(beyond - image) / _STEP
         least = np.where(self.device.contains(image), rate, np.inf).min(axis=1)
         return np.where(np.isfinite(least), pixels / least, 0.0)
 
@@ -170,7 +170,7 @@ class DivergingLight:
 
     def off_axis(self, local: _Array) -> _Array:
         """Return the angle to the ray of the image's middle [deg]."""
-        far = np.maximum(np.linalg.norm(local, axis=1), 1e-12)
+        far = np.maximum(lengths(local), 1e-12)
         along = local @ self.device.middle_ray / far
         return np.degrees(np.arccos(np.clip(along, -1.0, 1.0)))
 

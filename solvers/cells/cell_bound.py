@@ -1,7 +1,8 @@
 """How many poses are needed at least, wherever in their cells they stand.
 
 First multipliers (``cell_multipliers``), one count after the other; then the search
-over multisets of cells (``cell_tuples``). Cut short, the bound is lower but true.
+over multisets of cells (``cell_tuples``). Cut short, the bound is lower but true. Where
+a look finds cells that no search refutes, only smaller counts are searched.
 """
 
 import enum
@@ -23,6 +24,9 @@ from .cell_tuples import Enough, refute_tuples
 
 DEFAULT_BUDGET = 2e10
 _MULTIPLIERS_SHARE = 0.75
+# A look for cells that survive: of so many poses at least, as of fewer multipliers soon
+# say all; multisets split at a time; and counted work, beside the budget.
+_LOOKED_FOR, _FEW, _LOOK = 2, 4, 2e8
 
 
 class CellStatus(enum.Enum):
@@ -126,14 +130,21 @@ class _Proof:
         if least:
             self.proof = "fewer were refuted before"
         self.survivor: NDArray[np.int64] | None = None
+        # Cells in which one pose fewer than the count may be enough, whatever is tried.
+        self.standing: NDArray[np.int64] | None = None
+        self.seen = self.store.names
 
     def run(self) -> CellBound:
         if not _reachable(self.whole, self.store):
             proof = "all cells together serve less than is required"
             return self._answer(CellStatus.INFEASIBLE, float("inf"), proof)
-        if self.lower < self.count - 1 and (self.lower or self._refute(0)):
+        most = self.count - 1
+        if most >= _LOOKED_FOR:
+            self._look(most)
+            most -= self.standing is not None
+        if self.lower < most and (self.lower or self._refute(0)):
             # Smaller numbers follow from larger ones.
-            self.search.refute_most(self.count - 1)
+            self.search.refute_most(most)
         while self.lower < self.count and self._refute(self.lower):
             pass
         if self.lower >= self.count:
@@ -145,9 +156,24 @@ class _Proof:
         proof = f"{self.proof}; search cut by the {cut}"
         return self._answer(CellStatus.CUT, float(self.lower), proof)
 
+    def _look(self, n_poses: int) -> None:
+        """Look shortly, where cells serve most, for so many that no search refutes."""
+        allowed, left = min(_LOOK, self.budget.units), self.budget.time_left
+        look = WorkBudget(allowed, time_limit=max(0.0, left))
+        store = CellStore(self.tree, look)
+        answer = refute_tuples(
+            self.whole, store, n_poses, self.search.multipliers, look, _FEW
+        )
+        self.seen = store.names
+        if answer.survivor is not None:
+            self.standing = store.names[answer.survivor]
+
     def _refute(self, n_poses: int) -> bool:
         if n_poses == 0:
             return self._refute_none()
+        if n_poses == self.count - 1 and self.standing is not None:
+            self.survivor = self.standing
+            return False
         if self.search.refute(n_poses):
             self.lower = int(min(self.search.bound, self.count))
             self.proof = "multipliers of the rows"
@@ -189,7 +215,7 @@ class _Proof:
             largest_cost=search.largest_cost,
             by_multipliers=search.bound,
             most_weight=min(self.whole.in_unit(most), total),
-            cells_used=self.store.size,
+            cells_used=np.union1d(self.store.names, self.seen).size,
         )
 
 

@@ -23,7 +23,7 @@ class CapTree:
     def __init__(self, points, radius, depth):
         self.points = np.asarray(points, dtype=float)
         self.radius, self.depth = radius, depth
-        self.asked = 0
+        self.made = set()
 
     @property
     def n_rows(self):
@@ -37,7 +37,7 @@ class CapTree:
         cells = np.asarray(cells)
         of = np.flatnonzero(self.level(cells) < self.depth)
         found = self.split(cells[of])
-        self.asked += found.size
+        self.made.update(found.tolist())
         rows = pack_rows(self.serves(found))
         return CellBatch(found, np.repeat(of, self.arity), rows)
 

@@ -13,9 +13,9 @@ from math import ceil, sqrt
 
 import numpy as np
 
-from geometry.arrays import Array
+from geometry.arrays import Array, lengths
 from geometry.mesh.mesh import MeshError, TriangleMesh
-from geometry.mesh.tensors import area_normals, lengths
+from geometry.mesh.tensors import area_normals
 from geometry.mesh.topology import mesh_edges, numbered
 
 from .geodesic import GeodesicGrid, geodesic_grid

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import lengths
 from planning.model.calibration_errors import PERFECT, CalibrationErrors
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import Workspace
@@ -71,7 +72,7 @@ class RingsOnSurface:
             return normals
         along = np.einsum("ij,pij->pi", rays, normals)
         m = rays - along[..., None] * normals
-        return m / np.maximum(np.linalg.norm(m, axis=2), 1e-12)[..., None]
+        return m / np.maximum(lengths(m), 1e-12)[..., None]
 
 
 def best_rings(
@@ -94,16 +95,16 @@ def best_rings(
     """
     pose = camera.world_from_device
     ray = surface.points[samples] - pose[:3, 3]
-    distance = np.linalg.norm(ray, axis=1)
+    distance = lengths(ray)
     r, normal = ray / distance[:, None], surface.normals[samples]
     m = rings.across(samples, r)
     along = np.einsum("ij,pij->pi", r, m)
     facing = -np.einsum("ij,ij->i", r, normal)
     v = normal * along[..., None] + m * facing[:, None]
     jacobian = pose[:3, :3] @ camera.device.ray_jacobian(ray @ pose[:3, :3])
-    g = np.linalg.norm(np.einsum("ijk,pij->pik", jacobian, v), axis=2)
-    per_length = g / np.maximum(np.linalg.norm(v, axis=2), 1e-9)
-    reach = np.maximum(distance * np.linalg.norm(v, axis=2), 1e-12)
+    g = lengths(np.einsum("ijk,pij->pik", jacobian, v))
+    per_length = g / np.maximum(lengths(v), 1e-9)
+    reach = np.maximum(distance * lengths(v), 1e-12)
     placed = np.broadcast_to(rings.placed, rings.spacing.shape)[:, samples]
     turned = calibration_px(limits.calibration, distance, per_length)
     edge = per_length * np.hypot(rings.noise_px[:, samples], turned)

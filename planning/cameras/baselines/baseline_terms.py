@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import lengths
 from geometry.devices import PinholeModel
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import Workspace
@@ -137,7 +138,7 @@ class BaselineTerms:
             lost = lost[np.linspace(0, len(lost) - 1, _LOST).astype(np.int64)]
         ray = self.surface.points[lost][:, None] - centres[None]
         facing = -np.einsum("ikj,ij->ik", ray, self.surface.normals[lost])
-        facing = facing / np.linalg.norm(ray, axis=2)
+        facing = facing / lengths(ray)
         holder = np.argmax(np.where(self.measured_by[lost], facing, -2.0), axis=1)
         return np.column_stack([holder, lost]).astype(np.int64)
 
@@ -178,7 +179,7 @@ class BaselineTerms:
             alone = np.flatnonzero(sole & measured_by[:, c])
             ray = surface.points[alone] - camera.world_from_device[:3, 3]
             facing = -np.einsum("ij,ij->i", ray, surface.normals[alone])
-            facing /= np.linalg.norm(ray, axis=1)
+            facing /= lengths(ray)
             eased = facing >= least
             if self.rings is not None and len(alone):
                 best = best_rings(camera, alone, surface, self.rings, self.limits)

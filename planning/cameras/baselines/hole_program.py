@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import lengths
 from planning.model.planned import PlannedCamera
 from solvers.poses.baseline_problem import BaselineProblem
 
@@ -147,7 +148,7 @@ class HoleTerms:
         """
         pose, surface = camera.world_from_device, self.surface
         ray = surface.points - pose[:3, 3]
-        distance = np.linalg.norm(ray, axis=1)
+        distance = lengths(ray)
         ray = ray / distance[:, None]
         facing = -np.einsum("ij,ij->i", ray, surface.normals)
         near, far = camera.device.range_m

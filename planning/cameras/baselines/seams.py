@@ -16,6 +16,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
+from geometry.arrays import lengths
+
 _Array = NDArray[np.float64]
 
 # Parts that share less of the target can't be registered with each other.
@@ -57,7 +59,7 @@ class SampledSurface:
         # The nearest of one needn't have it among its own nearest.
         both = np.concatenate([n * first + second, n * second + first])
         first, second = np.divmod(np.unique(both), n)
-        apart = np.linalg.norm(points[first] - points[second], axis=1)
+        apart = lengths(points[first] - points[second])
         order = np.lexsort((second, apart, first))
         return first[order], second[order]
 
@@ -188,11 +190,11 @@ def spread_points(
         return np.arange(len(points))
     chosen = [] if first is None else first[: n // 2].tolist()
     chosen = chosen or [0]
-    gap = np.min(np.linalg.norm(points[:, None] - points[chosen][None], axis=2), axis=1)
+    gap = np.min(lengths(points[:, None] - points[chosen][None]), axis=1)
     while len(chosen) < n:
         farthest = int(np.argmax(gap))
         chosen.append(farthest)
-        gap = np.minimum(gap, np.linalg.norm(points - points[farthest], axis=1))
+        gap = np.minimum(gap, lengths(points - points[farthest]))
     return np.array(sorted(chosen), dtype=np.int64)
 
 

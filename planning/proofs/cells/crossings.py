@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import lengths
 from planning.model.requirements import TriangulationLimits
 from planning.scene.codes.surfaces import CodedPixels, CodeSurfaces
 from planning.scene.limits.calibration_terms import surface_deviation
@@ -58,7 +59,7 @@ class RingCrossings:
         placed = surface_deviation(limits.limited_calibration, rings.levers)
         self._placed = np.hypot(placed, limits.ring_sigma_m or 0.0) * squarely
         along = np.cross(normals, self._across)
-        self._width = np.linalg.norm(along, axis=1)
+        self._width = lengths(along)
         self._along = along / np.where(self._width > 0.0, self._width, 1.0)[:, None]
 
     def best(self, k: _Index, cone: Cone, facing: _Array, turn: _Array) -> PairCell:

@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import lengths
 from geometry.directions.cube_map import CubeMap, quarters
-from geometry.mesh.tensors import lengths
 
 _ROUNDING = 1e-9
 # Unit middles of cells (n, 3), and the angle about each that holds it [rad], (n,).

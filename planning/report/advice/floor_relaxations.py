@@ -12,11 +12,12 @@ import numpy as np
 from planning.model.document.coverage_records import RegionRecord
 from planning.model.words import count_words
 from planning.projectors.candidate_set import CandidateSet
-from planning.proofs.selection import fewest_count
 from planning.report.judged import Devices
 from planning.report.region_claims import RegionSamples
 from planning.rig.rig import Rig
 from planning.scene.measured import lit_samples
+from solvers.covers.cover import solve_cover
+from solvers.status import SolveStatus
 
 from .camera_relaxations import least_demands
 from .demands import light_demands
@@ -28,6 +29,8 @@ from .least_changes import (
 
 # Shares are told in parts of so much, rounded down.
 _SHARES = 10_000
+# Counted work for how many projectors a floor takes: it is advice.
+_ADVICE = 3e8
 
 
 def with_floor_relaxations(
@@ -77,9 +80,13 @@ def with_small_floor(
     share = np.floor(_SHARES * share) / _SHARES
     required = replace(scene.requirements, region_share=share)
     asked = replace(candidates, scene=replace(scene, requirements=required))
+    few = solve_cover(
+        asked.cover.problem, seed=scene.seed, budget=_ADVICE, heaviest=False
+    )
+    most = "" if few.status is SolveStatus.OPTIMAL else "at most "
     told = (
-        f"[requirements] region_share = {share:g} gives it a floor and takes "
-        f"{count_words(fewest_count(asked.cover), 'projector')} of the candidates",
+        f"[requirements] region_share = {share:g} gives it a floor and takes {most}"
+        f"{count_words(len(few.selected), 'projector')} of the candidates",
     )
     return tuple(
         region.changed(coverage=region.coverage.changed(relaxations=told))

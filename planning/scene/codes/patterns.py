@@ -7,8 +7,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import lengths
 from geometry.devices import ParallelModel
-from geometry.mesh.tensors import lengths
 from geometry.poses import inverse, transform
 from planning.model.light.dense_code import DenseCode
 from planning.model.planned import PlannedProjector

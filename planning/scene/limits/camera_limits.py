@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import lengths
 from geometry.devices import PinholeModel
-from geometry.mesh.tensors import lengths
 from geometry.poses import inverse, transform
 from planning.model.planned import PlannedCamera
 from planning.model.requirements import CameraLimits

@@ -12,6 +12,7 @@ radius to spare holds of the whole ball.
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import lengths
 from geometry.directions.cube_map import angle_between
 from geometry.shapes.boxes import OrientedBox, boxes_overlap
 from planning.model.bodies import Box
@@ -30,7 +31,7 @@ def depth(box: Box, offsets: _Array) -> _Array:
     """Return how deep positions lie in a box, shape (n,) [m]; negative outside."""
     beyond = np.abs((offsets - np.array(box.centre_m)) @ np.array(box.axes).T)
     beyond = beyond - np.array(box.half_m)
-    outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
+    outside = lengths(np.maximum(beyond, 0.0))
     return np.where(outside > 0.0, -outside, -beyond.max(axis=1))
 
 
@@ -63,7 +64,7 @@ def admissible(
 
     `slack` is of radii, as a share; of cosines; of heights in [m].
     """
-    distance = np.linalg.norm(offsets, axis=1)
+    distance = lengths(offsets)
     low, high = radius_m[0] * (1.0 - slack), radius_m[1] * (1.0 + slack)
     inside = (distance >= low - _ROUNDING) & (distance <= high + _ROUNDING)
     # Every direction is within pi, whatever the rounding of its cosine.

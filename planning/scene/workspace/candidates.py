@@ -11,6 +11,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import lengths
 from geometry.devices import DeviceModel, turned_to
 from geometry.poses import fibonacci_cap, look_at
 from planning.model.device_poses import moved_to
@@ -115,7 +116,7 @@ class Candidates(Generic[_D]):
             self.workspace, self._shell, -(-n // len(self.rolls))
         )
         offsets = positions - np.array(self.workspace.centre)
-        offsets /= np.linalg.norm(offsets, axis=1, keepdims=True)
+        offsets /= lengths(offsets)[:, None]
         near = min(0.5 * sum(self._shell), self._shell[0] + _NUDGE_M)
         return self._at(self._aimed(self._positions(offsets, near)))
 
@@ -229,4 +230,4 @@ def _directions(site: Site, n: int) -> _Array:
     """Directions from the centre of n positions or more, if there are as many."""
     offsets = shell_positions(site.workspace, site.radius_m, n)
     offsets = offsets - np.array(site.workspace.centre)
-    return offsets / np.linalg.norm(offsets, axis=1, keepdims=True)
+    return offsets / lengths(offsets)[:, None]

@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import lengths
+
 from .arrays import Array, Columns
 
 # Error of a normal that is estimated from the points around [rad].
@@ -82,7 +84,7 @@ class Cloud(Columns):
         At least a share of all that it moves, for normals are estimated.
         """
         along = np.einsum("ij,ij->i", self.shift, normals)
-        return np.hypot(along, _NORMAL_RAD * np.linalg.norm(self.shift, axis=1))
+        return np.hypot(along, _NORMAL_RAD * lengths(self.shift))
 
     @staticmethod
     def empty() -> "Cloud":

@@ -10,6 +10,8 @@ from typing import Literal
 
 import numpy as np
 
+from geometry.arrays import lengths
+
 from .arrays import Array, Mask
 
 LightName = Literal["diverging", "parallel"]
@@ -143,7 +145,7 @@ class _Diverging(LightLaw):
 
     def rays(self, p: Array, pose: Array) -> tuple[Array, Array]:
         beams = p @ pose[:3, :2].T + pose[:3, 2]
-        beams /= np.linalg.norm(beams, axis=1, keepdims=True)
+        beams /= lengths(beams)[:, None]
         return np.broadcast_to(pose[:3, 3], beams.shape), beams
 
     def aim(

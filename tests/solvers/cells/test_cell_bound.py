@@ -433,6 +433,19 @@ def test_the_circle_needs_as_many_arcs_as_divide_it(cap_trees, n, reach, share):
     assert rows.any(axis=0).sum() >= needed
 
 
+def test_what_no_search_refutes_is_soon_seen(cap_trees):
+    """Two caps are enough: only one has to be refuted, and no cells beside are made."""
+    tree = cap_trees.SphereTree(cap_trees.spread(120), 66 * DEG, 6)
+    problem = CellProblem(np.ones(120), 76.0)
+    answer = bound_count(problem, tree, 3)
+    assert (answer.lower_bound, answer.status) == (2, CellStatus.SURVIVED)
+    assert tree.serves(answer.survivor).any(axis=0).sum() >= 76
+    vainly = CellStore(tree, WorkBudget(PLENTY))
+    search = MultiplierSearch(whole_rows(problem), vainly, WorkBudget(PLENTY))
+    assert not search.refute(2)
+    assert 3 * answer.cells_used < vainly.size
+
+
 @pytest.mark.parametrize("redundancy", [2, 3])
 def test_the_circle_twice_needs_twice_as_many(cap_trees, redundancy):
     tree = on_circle(cap_trees, 48, 16, 9)
@@ -590,12 +603,12 @@ def test_cells_made_when_asked_for_prove_the_same(cap_trees):
     lazy = cap_trees.SphereTree(cap_trees.spread(120), 66 * DEG, 4)
     whole, names = cap_trees.flatten(lazy)
     problem = CellProblem(np.random.default_rng(0).random(120), 50.0)
-    lazy.asked = 0
+    lazy.made.clear()
     one, two = bound_count(problem, lazy, 4), bound_count(problem, whole, 4)
     assert (one.lower_bound, one.status) == (two.lower_bound, two.status)
     np.testing.assert_array_equal(one.multipliers, two.multipliers)
     np.testing.assert_array_equal(one.survivor, names[two.survivor])
-    assert one.cells_used == lazy.asked + 6 < names.size
+    assert one.cells_used == len(lazy.made) + 6 < names.size
 
 
 def test_threads_change_nothing(cap_trees, by_threads):

@@ -93,13 +93,14 @@ class _Light:
             )
         ]
         measured = np.zeros(len(case.samples), dtype=bool)
-        lit = np.flatnonzero(case.actual.lit)
-        samples, by = case.samples.take(lit), case.actual.lit_by[:, lit]
         for k in places:
+            # What one camera measures needn't be asked of the others.
+            rest = np.flatnonzero(case.actual.lit & ~measured)
+            samples, by = case.samples.take(rest), case.actual.lit_by[:, rest]
             steps = pairs_with(
                 self._cameras[k], evenly, samples, by, limits, case.shadow
             )
-            measured[lit] |= np.any(steps == MEASURED, axis=0)
+            measured[rest] = np.any(steps == MEASURED, axis=0)
         return measured
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from geometry.arrays import Array, Mask
+from geometry.arrays import Array, Mask, lengths
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.audit_samples import AuditSamples
@@ -98,11 +98,11 @@ def _free_share(
     caster = shadow.caster
     begin = points + _ABOVE * caster.mesh.radius * normals
     free = np.zeros(len(points))
+    beyond = np.full(len(points), 4.0 * caster.reach / caster.scale)
     for _ in range(_RAYS):
         # The normal plus a point of the unit sphere follows the cosine law.
         ball = rng.normal(size=normals.shape)
-        along = normals + ball / np.linalg.norm(ball, axis=1, keepdims=True)
-        along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
-        hit, _ = caster.first_hits(begin, along)
-        free += hit < 0
+        along = normals + ball / lengths(ball)[:, None]
+        along /= np.maximum(lengths(along), 1e-12)[:, None]
+        free += ~caster.occluded(begin, along, beyond)
     return free / _RAYS

@@ -19,6 +19,7 @@ from .audit_optics import (
     in_image,
     in_world,
     lens_shifts,
+    pixel_gradient,
     pixels_of,
     towards,
 )
@@ -112,7 +113,8 @@ class DivergingRays:
 
     def panel_shifts(self, local: Array, m: Array) -> tuple[Array, Array]:
         """Return what a panel twice as wide, and 1 px, shift along m [m], (n,) each."""
-        return lens_shifts(self.device, local, m)
+        gradient = pixel_gradient(self.device, local, m)
+        return lens_shifts(self.device, local, gradient)
 
     def pixel_sides(self, z: Array) -> Array:
         """Return how wide the panel's pixels are at depths (n,) [m]."""

@@ -6,7 +6,7 @@ numerically: an error of sign or of order shows as a difference of areas.
 
 import numpy as np
 
-from geometry.arrays import Array, Mask, cross
+from geometry.arrays import Array, Mask, cross, lengths
 from geometry.devices import PinholeModel
 
 _STEP = 1e-5
@@ -21,7 +21,7 @@ def dot(a: Array, b: Array) -> Array:
 def towards(points: Array, origin: Array) -> tuple[Array, Array]:
     """Return unit directions from an origin to points (n, 3), and distances (n,)."""
     offset = points - origin
-    length = np.linalg.norm(offset, axis=1)
+    length = lengths(offset)
     with np.errstate(invalid="ignore"):
         return offset / length[:, None], length
 
@@ -65,7 +65,7 @@ def rays_of(device: PinholeModel, pixels: Array) -> Array:
     local[:, :2] = (pixels - device.camera_matrix[:2, 2]) / focal
     for _ in range(_INVERSIONS):
         local[:, :2] += (pixels - pixels_of(device, local)) / focal
-    return local / np.linalg.norm(local, axis=1, keepdims=True)
+    return local / lengths(local)[:, None]
 
 
 def in_image(resolution: tuple[int, int], pixels: Array) -> Mask:
@@ -82,10 +82,11 @@ def pixel_gradient(device: PinholeModel, local: Array, across: Array) -> Array:
     two directions e1, e2 perpendicular to the ray r, taken by central differences; then
     J_r = E A^-1 with E = [e1 e2], and g = A^-T E^T v. All in the camera's own frame.
     """
-    r = local / np.linalg.norm(local, axis=1, keepdims=True)
-    spare = np.where(np.abs(r[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
-    e1 = cross(r, spare)
-    e1 /= np.linalg.norm(e1, axis=1, keepdims=True)
+    r = local / lengths(local)[:, None]
+    (x, y, z), zero = r.T, np.zeros(len(r))
+    # Across the first axis, or where it is too near to the ray across the second.
+    e1 = np.where(np.abs(x) < 0.7, [zero, z, -y], [-z, zero, x]).T
+    e1 /= lengths(e1)[:, None]
     e2 = cross(r, e1)
     a, b = (
         (pixels_of(device, r + _STEP * e) - pixels_of(device, r - _STEP * e))
@@ -100,13 +101,12 @@ def pixel_gradient(device: PinholeModel, local: Array, across: Array) -> Array:
 
 
 def lens_shifts(
-    device: PinholeModel, local: Array, across: Array
+    device: PinholeModel, local: Array, gradient: Array
 ) -> tuple[Array, Array]:
     """Return what a focal length twice as long, and 1 px, move rays by [m], (n,) each.
 
-    Along vectors (n, 3) across the rays to points (n, 3), all in the device's frame.
+    Along the vectors of a `pixel_gradient` at points (n, 3) in the device's frame.
     """
-    gradient = pixel_gradient(device, local, across)
     off_centre = pixels_of(device, local) - device.camera_matrix[:2, 2]
-    reach = np.linalg.norm(local, axis=1)
-    return reach * dot(gradient, off_centre), reach * np.linalg.norm(gradient, axis=1)
+    reach = lengths(local)
+    return reach * dot(gradient, off_centre), reach * np.hypot(*gradient.T)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.arrays import Array, cross
+from geometry.arrays import Array, cross, lengths
 from planning.model.light.dense_code import DenseCode
 from planning.model.light.drawn_edges import DrawnEdges
 from planning.model.light.light_budget import LightBudget
@@ -33,6 +33,7 @@ class PairGeometry:
         m: Unit normals of the surfaces of equal code.
         w: What an error of a viewing ray moves the point by, along the normal.
         levers: (N.r) / (m.r), what an error of such a surface moves it by.
+        gradient: w.dX of a viewing ray in pixels, at unit length [1/px], (n, 2).
         per_px: What an edge that is off by 1 px does along the normal [m/px].
         incidence: -N.L.
         normals: N.
@@ -47,6 +48,7 @@ class PairGeometry:
     m: Array
     w: Array
     levers: Array
+    gradient: Array
     per_px: Array
     incidence: Array
     normals: Array
@@ -68,14 +70,15 @@ class PairGeometry:
             w = normal - m * levers[:, None]
             turn = camera.world_from_device[:3, :3]
             local = in_frame(camera.world_from_device, points)
-            g = np.linalg.norm(pixel_gradient(camera.device, local, w @ turn), axis=1)
-            pitch = spacing * np.abs(levers) / (t * g)
+            g = pixel_gradient(camera.device, local, w @ turn)
+            per_px = t * np.hypot(*g.T)
+            pitch = spacing * np.abs(levers) / per_px
         return cls(
-            *(projector, camera, points, m, w, levers, t * g),
+            *(projector, camera, points, m, w, levers, g, per_px),
             *(-dot(normal, light), normal),
             np.abs(dot(r, m)),
             pitch,
-            np.arctan2(np.linalg.norm(cross(light, r), axis=1), dot(light, r)),
+            np.arctan2(lengths(cross(light, r)), dot(light, r)),
         )
 
     def levels(self, light: LightBudget) -> LightLevels:
@@ -90,10 +93,10 @@ def _surfaces(
     """Return m (n, 3), and how far rings are apart along it (n,) [m]; inf: no rings."""
     if projector.code is not None:
         across = cross(light, cross(rays, light))
-        across = across / np.linalg.norm(across, axis=1)[:, None]
+        across = across / lengths(across)[:, None]
         return across, np.full(len(points), np.inf)
     gradient = projector.ring_gradient(points)
-    steepness = np.linalg.norm(gradient, axis=1)
+    steepness = lengths(gradient)
     gap = projector.ring_gap(projector.ring_coordinate(points))
     return gradient / steepness[:, None], gap / steepness
 
@@ -134,7 +137,7 @@ def error_terms(pair: PairGeometry, limits: TriangulationLimits) -> dict[str, Ar
         ):
             offset = pair.points - device.world_from_device[:3, 3]
             terms[name] = np.sqrt(
-                (angle * np.linalg.norm(cross(offset, across), axis=1)) ** 2
+                (angle * lengths(cross(offset, across))) ** 2
                 + position**2 * dot(across, across)
                 + (focal * longer) ** 2
                 + (principal * per_px) ** 2
@@ -188,9 +191,8 @@ def _blur(pair: PairGeometry, drawn: DrawnEdges) -> tuple[Array, Array]:
 
 def _image_shifts(pair: PairGeometry) -> tuple[Array, Array]:
     """Return what a focal length doubled, and 1 px, move the points by [m], (n,)."""
-    pose, device = pair.camera.world_from_device, pair.camera.device
-    local = in_frame(pose, pair.points)
-    return lens_shifts(device, local, pair.w @ pose[:3, :3])
+    local = in_frame(pair.camera.world_from_device, pair.points)
+    return lens_shifts(pair.camera.device, local, pair.gradient)
 
 
 def _panel_shifts(pair: PairGeometry) -> tuple[Array, Array]:

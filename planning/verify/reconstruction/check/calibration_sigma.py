@@ -14,6 +14,7 @@ from typing import TypeVar
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from geometry.arrays import lengths
 from planning.model.calibration_errors import CalibrationErrors
 from planning.verify.reconstruction.arrays import Array
 from planning.verify.reconstruction.calibration import (
@@ -77,7 +78,7 @@ def camera_px(cloud: Cloud, scanner: Scanner) -> Array:
         return moved
     for c, camera in enumerate(scanner.cameras):
         rows = np.flatnonzero(cloud.camera == c)
-        reach = np.linalg.norm(cloud.points[rows] - camera.centre, axis=1)
+        reach = lengths(cloud.points[rows] - camera.centre)
         aside = cloud.pixels[rows] - camera.matrix[:2, 2]
         turned = np.hypot(errors.about_axis, errors.along_axis_m / reach)
         longer = errors.focal**2 * np.square(aside).sum(axis=1) / 2.0
@@ -104,7 +105,7 @@ def _of_pair(
 
     def told(off: ProjectorCalibration) -> Array:
         pixels, _ = off.panel(cloud.points)
-        return np.linalg.norm(projector.ring_plane(pixels), axis=1)
+        return lengths(projector.ring_plane(pixels))
 
     return _moved(cloud, normals, camera, projector, covariance, ring, told)
 
@@ -123,7 +124,7 @@ def _of_codes(
     """
     line = _seen(second, cloud.points + _STEP_M * cloud.rays)
     line -= _seen(second, cloud.points - _STEP_M * cloud.rays)
-    line /= np.linalg.norm(line, axis=1)[:, None]
+    line /= lengths(line)[:, None]
 
     def along(points: Array) -> Array:
         return np.einsum("ij,ij->i", line, _seen(second, points))
@@ -170,7 +171,7 @@ def _moved(
     )
     along = np.einsum("ij,ij->i", gradient, rays)
     facing = np.einsum("ij,ij->i", normals, rays)
-    reach = np.linalg.norm(points - camera.centre, axis=1)[:, None]
+    reach = lengths(points - camera.centre)[:, None]
     steps = _SHARE * np.sqrt(np.diag(covariance))
     moves: list[Array] = []
     for off in _off(camera, steps[:9]):

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from geometry.arrays import lengths
 from geometry.mesh.sampling import SurfaceSamples
 from planning.model.document.check_records import (
     ConfusionPair,
@@ -150,7 +151,7 @@ def _widened(by_camera: Mask, samples: SurfaceSamples, plan: Scanner) -> Mask:
     cameras, chosen = np.nonzero(by_camera)
     tau_m, points = plan.limits.check.tau_m, samples.points[chosen]
     rays = points - np.array([camera.centre for camera in plan.cameras])[cameras]
-    rays /= np.linalg.norm(rays, axis=1)[:, None]
+    rays /= lengths(rays)[:, None]
     ideal = replace(
         Cloud.empty(), points=points, rays=rays, camera=cameras.astype(np.int16)
     )

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
+from geometry.arrays import lengths
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.proximity import ClosestPoints, closest_points
 from planning.verify.reconstruction.arrays import Array, Indices, Mask
@@ -174,7 +175,7 @@ def best_fit(mesh: TriangleMesh, points: Array, noise_m: float) -> Array:
     def slopes(motion: Array) -> Array:
         there, foot = nearest(motion.tobytes())
         away = (there - foot.points) * np.sign(foot.distances)[:, None]
-        length = np.linalg.norm(away, axis=1, keepdims=True)
+        length = lengths(away)[:, None]
         # On the surface itself only the face tells its direction.
         flat = length < 1e-9
         normals = np.where(

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import erfinv
 
+from geometry.arrays import lengths
 from geometry.rays.proximity import closest_points
 from geometry.rays.rays import RayCaster
 from planning.model.document.check_records import InterreflectionRecord
@@ -213,7 +214,7 @@ def _cosine_directions(normals: Array, n_each: int, rng: np.random.Generator) ->
     """Directions drawn by their cosine to each normal, (n * n_each, 3)."""
     every = np.repeat(normals, n_each, axis=0)
     ball = rng.standard_normal(every.shape)
-    ball /= np.linalg.norm(ball, axis=1)[:, None]
+    ball /= lengths(ball)[:, None]
     # A point of the unit sphere about the normal's tip is Lambert's law.
     along = every + 0.999999 * ball
-    return along / np.linalg.norm(along, axis=1)[:, None]
+    return along / lengths(along)[:, None]

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from geometry.arrays import lengths
 from planning.verify.reconstruction.arrays import Array, Indices, Mask
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.decode.decode import PairIndex
@@ -33,7 +34,7 @@ def compare_overlaps(
     """
     shared, crossed, differs = (np.zeros(len(cloud), dtype=bool) for _ in range(3))
     size = pixel_sizes(cloud, plan)
-    noise = np.linalg.norm(cloud.shift, axis=1) * cloud.noise_px
+    noise = lengths(cloud.shift) * cloud.noise_px
     for (q, c), image in lit.items():
         doubt_px = _noise_px(cloud, q, c)
         others = np.flatnonzero((cloud.camera == c) & (cloud.projector != q))

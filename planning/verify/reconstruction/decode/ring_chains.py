@@ -5,6 +5,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
+from geometry.arrays import lengths
 from planning.verify.reconstruction.arrays import Array, Indices
 
 from .edges import ImageEdges
@@ -36,7 +37,7 @@ def chains(
     place = np.column_stack([edges.pixels[met], _RING_APART_PX * edges.rings[met]])
     tree = KDTree(place)
     one, other = tree.query_pairs(_NEAR_PX, output_type="ndarray").T
-    run = np.linalg.norm(place[one] - place[other], axis=1) * (t[one] / focal_px)
+    run = lengths(place[one] - place[other]) * (t[one] / focal_px)
     linked = np.abs(t[one] - t[other]) <= max_slant * run
     ends = one[linked], other[linked]
     links = coo_array((np.ones(len(ends[0])), ends), shape=(len(met), len(met)))

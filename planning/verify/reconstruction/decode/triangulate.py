@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import lengths
 from planning.verify.reconstruction.arrays import Array
 from planning.verify.reconstruction.calibration import ProjectorCalibration
 from planning.verify.reconstruction.light_laws import LightLaw
@@ -68,7 +69,7 @@ def intersect_rings(
     normals = local_normals @ projector.ring_axes.T
     size = 1.0
     if projector.drawn_for is not None:
-        size = np.linalg.norm(normals, axis=1)
+        size = lengths(normals)
         normals /= size[:, None]
     return RingHits(
         points=origin + t[:, None] * rays,

@@ -106,8 +106,7 @@ def frame_levels(
     """
     if frame.inverse:
         shown = frame_levels(canvas, pattern, replace(frame, inverse=False), response)
-        white = frame_levels(canvas, pattern, Frame(0, "white"), response)
-        return response.levels(response.light[white] - response.light[shown])
+        return response.left(response.levels(canvas.drawn), shown)
     if frame.kind == "root":
         assert frame.camera is not None
         return response.levels(canvas.drawn * canvas.outside[frame.camera])
@@ -117,12 +116,15 @@ def frame_levels(
 def _slope(values: Array) -> Array:
     """Return |grad| in units a pixel, never 0."""
     down, across = np.gradient(values)
-    return np.maximum(np.hypot(across, down), np.finfo(float).tiny)
+    return np.maximum(np.sqrt(across**2 + down**2), np.finfo(float).tiny)
 
 
 def _share(signed: Array, slope: Array) -> Grey:
     """Return the share beyond the border where a quantity is zero."""
-    away = np.clip(signed / slope, -1.5, 1.5)
-    parts = (np.maximum(away + x, 0.0) ** 2 for x in (1.5, 0.5, -0.5))
+    away = signed / slope
+    share = (away > 0.0).astype(np.float32)
+    near = np.abs(away) < 1.5
+    parts = (np.maximum(away[near] + x, 0.0) ** 2 for x in (1.5, 0.5, -0.5))
     first, second, third = parts
-    return (0.25 * (first - second - third)).astype(np.float32)
+    share[near] = 0.25 * (first - second - third)
+    return share

@@ -40,4 +40,19 @@ class Response:
     def levels(self, shares: Grey | Array) -> NDArray[np.uint8]:
         """Return the levels whose light is nearest to shares of white, any shape."""
         between = 0.5 * (self.light[1:] + self.light[:-1])
-        return np.searchsorted(between, shares).astype(np.uint8)
+        # Most pixels are dark or white: only the others are searched for.
+        levels = (shares >= 1.0) * np.uint8(WHITE)
+        grey = (shares > 0.0) & (shares < 1.0)
+        levels[grey] = np.searchsorted(between, shares[grey])
+        return levels
+
+    @cached_property
+    def _left(self) -> NDArray[np.uint8]:
+        levels = self.light[:, None] - self.light
+        return self.levels(levels).ravel()
+
+    def left(
+        self, whole: NDArray[np.uint8], part: NDArray[np.uint8]
+    ) -> NDArray[np.uint8]:
+        """Return the levels of what whole levels send more than parts, any shape."""
+        return self._left.take(whole.astype(np.uint16) * (WHITE + 1) + part)

@@ -13,6 +13,7 @@ from typing import Any, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import lengths
 from planning.model.planned import code_bits
 from planning.verify.reconstruction.arrays import Array, Grey, Images, Indices, Mask
 from planning.verify.reconstruction.light_laws import LightLaw
@@ -176,7 +177,7 @@ class RingsForCamera(DrawnRings):
             p: Normalised (x/z, y/z) or, in parallel light, (x, y) in [m], shape (n, 2).
         """
         square = self.light.root_weight(self.camera_in_ring[2])
-        slope = np.linalg.norm(2.0 * square * p - self.camera_in_ring[:2], axis=1)
+        slope = lengths(2.0 * square * p - self.camera_in_ring[:2])
         return self.root_level(*p.T) / np.maximum(slope, 1e-12)
 
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from geometry.arrays import lengths
 from geometry.rays.rays import CHUNK, RayCaster, equal_parts
 from planning.verify.reconstruction.arrays import Array, Columns, Grey, Indices
 from planning.verify.reconstruction.calibration import ProjectorCalibration
@@ -89,7 +90,7 @@ class Shown:
         slopes = slopes - slant[:, :, None] * normals[:, None]
         cell = _PIXEL_SPREAD / seen.fold * seen.distances[lit] / seen.camera.focal_px
         scale = np.diag(self.projector.matrix)[:2]
-        gathered = cell[:, None] * np.linalg.norm(slopes, axis=2) * scale
+        gathered = cell[:, None] * lengths(slopes) * scale
         square = in_focus_m**2
         if self.defocus is not None:
             square = square + self.defocus.blur_m(depth) ** 2

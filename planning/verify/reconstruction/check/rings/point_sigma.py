@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from geometry.arrays import lengths
 from planning.verify.reconstruction.arrays import Array, Indices, Mask
 from planning.verify.reconstruction.check.tiles import Tiles, plane_normals
 from planning.verify.reconstruction.cloud import Cloud
@@ -99,7 +100,7 @@ class Sigmas:
         outwards = onto - panel.inwards[:, None] * cloud.rays
         moved = replace(moved, bias_px=bias_px, points=outwards)
         # In a step there is no surface whose normal would make an error less.
-        largest = np.linalg.norm(moved.shift, axis=1) * moved.noise_px
+        largest = lengths(moved.shift) * moved.noise_px
         sigma = np.where(doubtful, largest, np.hypot(moved.sigma(normals), relief))
         return cls(moved, normals, sigma)
 

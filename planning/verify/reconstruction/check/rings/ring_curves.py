@@ -11,6 +11,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import lengths
 from planning.verify.reconstruction.arrays import Array, Indices, Mask
 from planning.verify.reconstruction.check.overlaps import pixel_sizes
 from planning.verify.reconstruction.cloud import Cloud
@@ -117,7 +118,7 @@ class RingCurves:
         blur as a share of what is usual, shape (n,).
         """
         two = self._linked(self._of_two_cameras())
-        spread = np.linalg.norm(self.slide, axis=1)
+        spread = lengths(self.slide)
         together, sharp = two._together(spread), sharpness[self.order]
         agree, apart = two._linked(together), two._linked(~together)
         noise = np.hypot(spread[agree.one], spread[agree.other])
@@ -142,7 +143,7 @@ class RingCurves:
         which the estimates of all narrower ones still lie within `_AGREE` deviations
         (intersecting intervals: Goldenshluger & Nemirovski 1997), so that creases stay.
         """
-        slide = np.linalg.norm(self.slide, axis=1)
+        slide = lengths(self.slide)
         lines = self._on_one_surface(slide)._lines(slide)
         slope, _ = lines.through(self.depth)
         # Places that are noise, too, turn lines towards the way that points slide.
