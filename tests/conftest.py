@@ -18,17 +18,24 @@ _LONGEST = (
     "pipeline",
     "captures",
     "cli",
+    "cached_plans",
+    "family_plans",
+    "held_claims",
+    "head_plans",
+    "reconstruction_check",
     "obstacles",
-    "invariance",
     "flips",
     "evaluation",
-    "reconstruction_check",
-    "reconstruction_diagnosis",
-    "camera_routes",
-    "existing",
     "audit_claims",
+    "front_plans",
+    "cell_bound",
+    "camera_routes",
     "ranges",
-    "closed_forms",
+    "existing",
+    "invariance",
+    "reconstruction_diagnosis",
+    "exact_cover",
+    "hollow",
 )
 
 
@@ -150,21 +157,29 @@ def _load(name: str) -> ModuleType:
 
 
 @pytest.fixture(scope="session")
-def with_little_work() -> Callable[[], AbstractContextManager[None]]:
-    """Few samples behind claims and confirmations, rough bounds over all poses."""
+def with_little_work() -> Callable[..., AbstractContextManager[None]]:
+    """Few samples behind claims and confirmations, few poses, rough bounds."""
 
     @contextmanager
-    def little() -> Generator[None]:
+    def little(*, every_pose: bool = False) -> Generator[None]:
         with pytest.MonkeyPatch.context() as patch:
-            _load("little_work").work_little(patch)
+            _load("little_work").work_little(patch, every_pose=every_pose)
             yield
 
     return little
 
 
 @pytest.fixture
+def least_work() -> Generator[None]:
+    """All on few samples in one test, where plans are compared with each other."""
+    with pytest.MonkeyPatch.context() as patch:
+        _load("little_work").work_least(patch)
+        yield
+
+
+@pytest.fixture
 def little_work(
-    with_little_work: Callable[[], AbstractContextManager[None]],
+    with_little_work: Callable[..., AbstractContextManager[None]],
 ) -> Generator[None]:
     """Little work in one test, where exactness isn't the question."""
     with with_little_work():

@@ -7,13 +7,14 @@ from dataclasses import replace
 
 import pytest
 from click.testing import CliRunner
+from support.little_work import LITTLE, found_path
+from support.plain_shapes import box
 
 from planning.cli.batch import batch_command, part_task, runners
 from planning.cli.batch.ledger import is_whole, read_rows, row_of, write_rows
 from planning.cli.batch.part_task import PartEnd, PartTask, plan_part
 from planning.cli.batch.parts import find_parts, part_files, rig_files
 from planning.cli.main import commands
-from planning.cli.other_commands import write_sample
 from planning.model.errors import InputError
 
 RIG = """
@@ -26,6 +27,7 @@ n_reference_projectors = 600
 n_reference_cameras = 400
 """
 FAST = ("--max-projectors", "5", "--cameras-by", "cover", "--no-check", "--no-patterns")
+FAST += ("--target", "surface", "--dominant-coverage", "0.6")
 
 
 def run(*words):
@@ -44,36 +46,42 @@ def done(tmp_path_factory):
     (place / "few.toml").write_text(RIG)
     parts = place / "parts"
     (parts / "sub").mkdir(parents=True)
-    write_sample(parts / "sub" / "head.obj", n_faces=1500)
+    shape = box((100.0, 60.0, 30.0))
+    lines = [f"v {x} {y} {z}" for x, y, z in shape.vertices]
+    lines += [f"f {a} {b} {c}" for a, b, c in shape.faces + 1]
+    (parts / "sub" / "block.obj").write_text("\n".join(lines))
     (parts / "broken.stl").write_text("no mesh at all")
     words = (parts, "-o", place / "out", "--rig", place / "few.toml", *FAST)
-    ended = run(*words, "--no-report")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(part_task, "_PLAN", LITTLE + part_task._PLAN)
+        patch.setenv("PYTHONPATH", found_path())
+        ended = run(*words, "--no-report")
     assert ended.exit_code == 1, ended.stderr
     return place, ended
 
 
 def test_every_part_is_told_and_the_others_are_planned(done):
     place, ended = done
-    broken, head = rows(place / "out")
+    broken, block = rows(place / "out")
     assert (broken["part"], broken["exit"], broken["verdict"]) == (
         *("broken.stl", "3", "failed"),
     )
     assert "not a usable STL" in broken["message"]
-    assert (head["part"], head["folder"]) == ("sub/head.obj", "sub/head")
-    assert head["verdict"] == "met, NOT CHECKED"
-    assert float(head["measured"]) >= 0.95
-    assert int(head["cameras_least"]) <= int(head["cameras"])
+    assert (block["part"], block["folder"]) == ("sub/block.obj", "sub/block")
+    assert block["verdict"] == "met, NOT CHECKED"
+    assert float(block["measured"]) >= 0.95
+    assert int(block["cameras_least"]) <= int(block["cameras"])
     assert "1 of 2 parts" in ended.stdout
     assert "FAILED   broken.stl" in ended.stdout
     page = (place / "out" / "index.html").read_text()
-    assert "sub/head.obj" in page
+    assert "sub/block.obj" in page
     assert "http" not in page.split("</style>")[1]
 
 
 def test_a_part_is_called_by_its_place_in_the_batch(done):
     place, _ = done
-    plan = (place / "out" / "sub" / "head" / "plan.json").read_text()
-    assert '"path": "sub/head.obj"' in plan
+    plan = (place / "out" / "sub" / "block" / "plan.json").read_text()
+    assert '"path": "sub/block.obj"' in plan
     assert str(place) not in plan.replace("surface.npz", "")
 
 
@@ -111,21 +119,21 @@ def test_what_changed_is_planned_again(done, tmp_path, monkeypatch, how):
     elif how == "rig":
         (again / "few.toml").write_text(RIG + "[limits]\nmax_sigma_mm = 0.4\n")
     elif how == "mesh":
-        with (again / "parts" / "sub" / "head.obj").open("a") as file:
+        with (again / "parts" / "sub" / "block.obj").open("a") as file:
             file.write("# another\n")
     elif how == "again":
         words.append("--again")
     else:
-        (again / "out" / "sub" / "head" / "surface.npz").write_bytes(b"damaged")
+        (again / "out" / "sub" / "block" / "surface.npz").write_bytes(b"damaged")
     run(*words)
-    assert sorted(begun) == ["broken.stl", "sub/head.obj"]
+    assert sorted(begun) == ["broken.stl", "sub/block.obj"]
 
 
 def test_an_interrupted_batch_keeps_what_ended(done, tmp_path, monkeypatch):
     place, _ = done
     files = {
         path.name: path.read_bytes()
-        for path in (place / "out" / "sub" / "head").iterdir()
+        for path in (place / "out" / "sub" / "block").iterdir()
         if path.is_file()
     }
 
@@ -161,10 +169,10 @@ def test_a_table_is_read_as_it_was_written(done, tmp_path):
     before = read_rows(place / "out")
     write_rows(before.values(), tmp_path)
     assert read_rows(tmp_path) == before
-    head = before["sub/head.obj"]
-    assert is_whole(head, place / "out")
-    assert not is_whole(replace(head, digest="0"), place / "out")
-    assert not is_whole(replace(head, exit=130), place / "out")
+    block = before["sub/block.obj"]
+    assert is_whole(block, place / "out")
+    assert not is_whole(replace(block, digest="0"), place / "out")
+    assert not is_whole(replace(block, exit=130), place / "out")
     (tmp_path / "batch.csv").write_text("no table")
     assert read_rows(tmp_path) == {}
 

@@ -1,5 +1,6 @@
 """`plan --watch` and `plan cache`: what is told, and when it ends."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -8,12 +9,13 @@ from queue import Queue
 
 import pytest
 from click.testing import CliRunner
+from support.little_work import LITTLE, found_path
 from support.plain_shapes import box
 
 from planning.cache.entries import FolderEntries
 from planning.cli.main import commands
 
-RUN = [sys.executable, "-c", "from planning.cli.main import main; main()"]
+RUN = [sys.executable, "-c", LITTLE + "from planning.cli.main import main; main()"]
 
 
 def _told(*words):
@@ -58,7 +60,11 @@ def watch(tmp_path, small_job):
     words += ["--target", "surface", "--no-check", "--no-report", "--no-patterns"]
     words += ["--cameras-by", "cover", "--threads", "1"]
     with subprocess.Popen(
-        [*RUN, *words], cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL
+        [*RUN, *words],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": found_path()},
+        stderr=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
     ) as run:
         lines: Queue[str] = Queue()
 

@@ -34,6 +34,12 @@ SHARES = {"dominant_coverage": 0.4, "coverage": 0.6}
 WISHES = Wishes(max_projectors=P, max_cameras=C, **SHARES)
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _few(with_little_work):
+    with with_little_work(every_pose=True):
+        yield
+
+
 @pytest.fixture(scope="module")
 def rig():
     few = {"n_candidate_projectors": 30, "n_candidate_cameras": 30}
@@ -46,9 +52,8 @@ def mesh():
 
 
 @pytest.fixture(scope="module")
-def kept(mesh, rig, with_little_work):
-    with with_little_work():
-        return plan_front(mesh, rig, WISHES, threads=1)
+def kept(mesh, rig):
+    return plan_front(mesh, rig, WISHES, threads=1)
 
 
 @pytest.fixture(scope="module")
@@ -122,7 +127,7 @@ def test_what_is_kept_is_what_candidates_light_and_see(kept, folder, mesh, rig):
 
 @pytest.mark.parametrize("count", [(1, 2), (2, 3)])
 def test_a_taken_point_claims_what_the_front_said_without_a_matrix(
-    count, folder, mesh, rig, monkeypatch, with_little_work
+    count, folder, mesh, rig, monkeypatch
 ):
     def forbidden(*_, **__):
         raise AssertionError("candidates are looked at again")
@@ -133,16 +138,15 @@ def test_a_taken_point_claims_what_the_front_said_without_a_matrix(
     monkeypatch.setattr(fronts, "matrix_of", forbidden)
     front = read_front(folder)
     point = front.front.point(*count)
-    with with_little_work():
-        plan = plan_rig(
-            mesh,
-            rig,
-            take=TakenPoint(front, point),
-            check=False,
-            on_miss="return",
-            threads=1,
-            **SHARES,
-        )
+    plan = plan_rig(
+        mesh,
+        rig,
+        take=TakenPoint(front, point),
+        check=False,
+        on_miss="return",
+        threads=1,
+        **SHARES,
+    )
     assert (len(plan.projectors), len(plan.cameras)) == count
     assert (plan.requirements.max_projectors, plan.requirements.max_cameras) == count
     areas, said = plan.coverage.target, share(point, front.front)
@@ -178,9 +182,8 @@ def test_a_changed_mesh_rig_seed_or_requirement_is_refused_by_name(folder, mesh,
     assert front.matrix(ready_for(mesh, rig, max_cameras=9)).seen.any()
 
 
-def test_the_same_front_with_any_number_of_threads(kept, mesh, rig, with_little_work):
-    with with_little_work():
-        again = plan_front(mesh, rig, WISHES, threads=2)
+def test_the_same_front_with_any_number_of_threads(kept, mesh, rig):
+    again = plan_front(mesh, rig, WISHES, threads=2)
     files = [io.BytesIO(), io.BytesIO()]
     for one, file in zip((kept, again), files, strict=True):
         one.write(file)

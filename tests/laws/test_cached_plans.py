@@ -8,6 +8,9 @@ from planning import Cache, load_rig, plan_rig, prepare
 from planning.handover.handed_plan import HandedPlan
 from planning.steps.recalled_mesh import recalled_mesh
 
+# Nothing here is about the number of samples.
+pytestmark = pytest.mark.usefixtures("least_work")
+
 ROOM = """
 [camera.body]
 size_mm = [60, 60, 150]
@@ -56,7 +59,7 @@ def _refuse(patch, names):
 
 @pytest.mark.parametrize("room", ["", ROOM])
 def test_the_command_finds_what_an_earlier_run_left_and_plans_the_same(
-    small_job, tmp_path, monkeypatch, block, with_little_work, room
+    small_job, tmp_path, monkeypatch, block, room
 ):
     monkeypatch.setattr(small_job, "RIG", small_job.RIG + room)
 
@@ -67,13 +70,12 @@ def test_the_command_finds_what_an_earlier_run_left_and_plans_the_same(
         return ended.plan, (tmp_path / "plan" / "surface.npz").read_bytes()
 
     other = ("--coverage", "0.9")
-    with with_little_work():
-        bare = planned("--no-cache"), planned(*other, "--no-cache")
-        monkeypatch.setenv("RINGRIG_CACHE", str(tmp_path / "cache"))
-        first = planned()
-        with pytest.MonkeyPatch.context() as patch:
-            _refuse(patch, [*DEAR, "recalled_mesh.load_mesh"])
-            second = planned(*other)
+    bare = planned("--no-cache"), planned(*other, "--no-cache")
+    monkeypatch.setenv("RINGRIG_CACHE", str(tmp_path / "cache"))
+    first = planned()
+    with pytest.MonkeyPatch.context() as patch:
+        _refuse(patch, [*DEAR, "recalled_mesh.load_mesh"])
+        second = planned(*other)
     for (plan, surface), (cached, kept) in zip(bare, (first, second), strict=True):
         _same(plan, cached)
         assert surface == kept
@@ -101,30 +103,28 @@ def test_a_file_that_moved_or_changed_is_told_as_it_is(tmp_path, block, monkeypa
     assert read(moved).size > 1.5 * first.size
 
 
-def test_a_prepared_planner_answers_as_plan_rig_does(rig, with_little_work):
+def test_a_prepared_planner_answers_as_plan_rig_does(rig):
     mesh = box((0.1, 0.06, 0.03))
     asked = {"max_projectors": 3, "target": "surface", "dominant_coverage": 0.6}
     asked |= {"check": False, "cameras_by": "cover", "on_miss": "return"}
-    with with_little_work():
-        planner = prepare(mesh, rig)
-        planner.plan(coverage=0.95, **asked)
-        with pytest.MonkeyPatch.context() as patch:
-            _refuse(patch, DEAR)
-            plan = planner.plan(coverage=0.9, **asked)
-        bare = plan_rig(mesh, rig, coverage=0.9, **asked)
+    planner = prepare(mesh, rig)
+    planner.plan(coverage=0.95, **asked)
+    with pytest.MonkeyPatch.context() as patch:
+        _refuse(patch, DEAR)
+        plan = planner.plan(coverage=0.9, **asked)
+    bare = plan_rig(mesh, rig, coverage=0.9, **asked)
     assert isinstance(plan, HandedPlan)
     _same(plan.to_document(), bare.to_document())
 
 
-def test_another_rig_finds_nothing_of_the_first(rig, with_little_work):
+def test_another_rig_finds_nothing_of_the_first(rig):
     cache = Cache.in_memory()
     asked = {"max_projectors": 3, "target": "surface", "dominant_coverage": 0.6}
     asked |= {"check": False, "cameras_by": "cover", "on_miss": "return"}
     other = rig.replace(limits={"projector_max_incidence_deg": 50.0})
-    with with_little_work():
-        plan_rig(box((0.1, 0.06, 0.03)), rig, cache=cache, **asked)
-        cached = plan_rig(box((0.1, 0.06, 0.03)), other, cache=cache, **asked)
-        bare = plan_rig(box((0.1, 0.06, 0.03)), other, **asked)
+    plan_rig(box((0.1, 0.06, 0.03)), rig, cache=cache, **asked)
+    cached = plan_rig(box((0.1, 0.06, 0.03)), other, cache=cache, **asked)
+    bare = plan_rig(box((0.1, 0.06, 0.03)), other, **asked)
     _same(cached.to_document(), bare.to_document())
 
 

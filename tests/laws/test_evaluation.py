@@ -106,7 +106,7 @@ def planned(folder, plate, with_little_work):
     wishes = "[requirements]\ncoverage = 0.8\ndominant_coverage = 0.8\n"
     wishes += "region_coverage = 0\n"
     rig = rig_file(folder, "plan.toml", wishes + "min_reachable = 0.1\n")
-    with with_little_work():
+    with with_little_work(every_pose=True):
         plan = made(plate, rig, max_projectors=3)
     plan.save(folder / "plan" / "plan.json")
     return rig, plan
@@ -114,7 +114,7 @@ def planned(folder, plate, with_little_work):
 
 def test_a_plan_evaluated_has_its_own_figures(folder, plate, planned, with_little_work):
     rig, plan = planned
-    with with_little_work():
+    with with_little_work(every_pose=True):
         seen = made(plate, rig, fixed=read_mounted(folder / "plan", rig))
     # Something else was asked, in another way.
     assert seen.coverage.changed(asked=plan.coverage.asked) == plan.coverage
@@ -146,7 +146,7 @@ def test_another_mesh_is_measured_by_the_same_rings(
     """Half the plate: the middle of either side of it, that the whole had, too."""
     rig, plan = planned
     half = TriangleMesh(plate.vertices * [0.5, 1.0, 1.0], plate.faces)
-    with with_little_work():
+    with with_little_work(every_pose=True):
         seen = made(half, rig, fixed=read_mounted(folder / "plan", rig))
     for one, other in zip(seen.projectors, plan.projectors, strict=True):
         assert np.array_equal(one.ring_radii, other.ring_radii)
@@ -161,7 +161,7 @@ def test_devices_that_are_kept_count_and_keep_their_names(
     rig, plan = planned
     kept_ids = [plan.projectors[-1].id, plan.cameras[0].id]
     fixed = read_mounted(folder / "plan", rig, kept_ids)
-    with with_little_work():
+    with with_little_work(every_pose=True):
         again = made(plate, rig, fixed=fixed, max_projectors=3)
     every = {d.id: d for d in (*again.projectors, *again.cameras)}
     assert len(every) == len(again.projectors) + len(again.cameras)
@@ -235,7 +235,7 @@ def broken(folder, plate, with_little_work):
         "one,camera,0,-1000,0,0,0,0\nbeside,camera,80,-1000,0,80,0,0\n"
         "in one,camera,0,-1000,30,0,0,30\nfar,camera,0,-2300,0,0,0,0\n"
     )
-    with with_little_work():
+    with with_little_work(every_pose=True):
         return made(plate, rig, fixed=read_mounted(folder / "broken.csv", rig))
 
 
@@ -292,7 +292,7 @@ def test_rings_that_were_to_stay_are_held_to_what_they_were(
     folder, plate, planned, with_little_work
 ):
     rig, _ = planned
-    with with_little_work():
+    with with_little_work(every_pose=True):
         seen = made(plate, rig, fixed=read_mounted(folder / "plan", rig))
     document = seen.to_document()
     document["projectors"][0]["ring_radii"][3] *= 1.001

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from support.little_work import bound_roughly, draw_fewer
+from support.little_work import bound_roughly, draw_fewer, offer_fewer, search_briefly
 
 from geometry.shapes.sample_head.sample_head import sample_head
 from planning import load_mesh, load_rig, plan_rig
@@ -69,6 +69,8 @@ def plans(head, tmp_path_factory):
         with pytest.MonkeyPatch.context() as patch:
             draw_fewer(patch, claims=3000, overlaps=3000)
             bound_roughly(patch)
+            search_briefly(patch)
+            offer_fewer(patch)
             found.append(planned(path, unit, up))
     return found
 

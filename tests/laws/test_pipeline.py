@@ -41,7 +41,7 @@ def plan(request, head, tmp_path_factory, with_little_work):
     """
     if request.param == "parallel":
         rig = load_rig("default", light="parallel")
-        with with_little_work():
+        with with_little_work(every_pose=True):
             return plan_rig(head, rig, max_projectors=4)
     (code,) = re.findall(r"```python\n(.*?)```", README.read_text("utf-8"), re.S)
     folder = tmp_path_factory.mktemp("readme")
@@ -50,7 +50,7 @@ def plan(request, head, tmp_path_factory, with_little_work):
     with (
         pytest.MonkeyPatch.context() as patch,
         redirect_stdout(said),
-        with_little_work(),
+        with_little_work(every_pose=True),
     ):
         patch.chdir(folder)
         exec(code, names)

@@ -1,8 +1,14 @@
 """Less work than a plan rests on, where a test isn't about how much there is."""
 
+import os
+import sys
 from dataclasses import replace
 
-from planning.proofs import camera_bound, projector_bound
+from planning.cameras import camera_baselines
+from planning.cameras.paper import hole_closing
+from planning.projectors import share_margin
+from planning.proofs import camera_bound, marginals, projector_bound
+from planning.rig.rig import Rig
 from planning.scene.draws import DRAWS
 
 # Of the work on bounds over all poses, which most plans spend most of their time on.
@@ -17,12 +23,50 @@ _FEW = {
     "baselines": 2000,
     "confirming_baselines": 4000,
 }
+# Poses offered: a rig file can ask for no fewer than 600 and 400.
+_POSES = {"n_projector_poses": 160, "n_camera_poses": 120}
+# Samples that devices and rings are fitted to, and that confirm them, where a plan is
+# compared with itself: whatever it is, both are.
+_FEWEST = {
+    "site": 600,
+    "projectors": 500,
+    "fresh_projectors": 1000,
+    "cameras": 500,
+    "fresh_cameras": 1000,
+    "axes": 500,
+    "surer": 500,
+    "baselines": 500,
+    "confirming_baselines": 1000,
+    "rings": 1000,
+    "claims": 1500,
+    "overlaps": 1500,
+}
+# What a process of its own runs first, to work little; and where it finds that.
+LITTLE = "import pytest\nfrom support.little_work import work_little\n"
+LITTLE += "work_little(pytest.MonkeyPatch())\n"
 
 
-def work_little(patch):
-    """Let claims and confirmations rest on few samples, and bounds cost little."""
+def found_path():
+    """Return a PYTHONPATH on which a process finds what this one does."""
+    return os.pathsep.join(filter(None, sys.path))
+
+
+def work_little(patch, *, every_pose=False):
+    """Let claims and confirmations rest on few samples; let bounds cost little.
+
+    And few poses be offered, unless `every_pose`.
+    """
     draw_fewer(patch, **_FEW)
     bound_roughly(patch)
+    search_briefly(patch)
+    if not every_pose:
+        offer_fewer(patch)
+
+
+def work_least(patch):
+    """Let all rest on few samples, where plans are compared with each other alone."""
+    work_little(patch)
+    draw_fewer(patch, **_FEWEST)
 
 
 def draw_fewer(patch, **counts):
@@ -32,8 +76,28 @@ def draw_fewer(patch, **counts):
         patch.setitem(vars(DRAWS), name, draw)
 
 
+def offer_fewer(patch):
+    """Let fewer poses be offered than a rig file can ask for, until it is undone."""
+    for name, count in _POSES.items():
+        patch.setattr(Rig, name, property(lambda _, count=count: count))
+
+
 def bound_roughly(patch):
     """Let bounds over all poses cost little, until `patch` is undone."""
     for bound in (camera_bound, projector_bound):
         less = replace(bound.DEFAULT, budget=_SHARE * bound.DEFAULT.budget, shadows=0.0)
         patch.setattr(bound, "DEFAULT", less)
+
+
+def search_briefly(patch):
+    """Let what is proved or allowed already be bettered less, until it is undone."""
+    for module, name, share in (
+        (camera_baselines, "_CAMERA_PROGRAMS", 0.1),
+        (hole_closing, "_PROGRAMS", 0.3),
+        (marginals, "_MARGINAL_BUDGET", _SHARE),
+        (marginals, "DEFAULT_BUDGET", _SHARE),
+        (share_margin, "_BUDGET", _SHARE),
+        (share_margin, "_STEP_RAD", 4.0),
+    ):
+        whole = getattr(module, name)
+        patch.setattr(module, name, type(whole)(share * whole))

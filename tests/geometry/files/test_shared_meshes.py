@@ -76,6 +76,7 @@ def test_a_shared_mesh_is_read_as_what_it_is(name: str, shared_meshes) -> None:
 
 
 @needs_shared
+@pytest.mark.usefixtures("little_work")
 @pytest.mark.parametrize("name", ["mediapipe_canonical_face_model.obj"])
 def test_a_small_shared_mesh_goes_through_the_main_job(
     name: str, shared_meshes, small_job, tmp_path: Path
