@@ -11,7 +11,7 @@ from solvers.cells.cell_bound import CellBound, CellStatus, bound_count
 from solvers.cells.cell_problem import CellProblem
 from solvers.cells.cell_tree import CellTree
 
-from .candidate_certificate import least_for_total
+from .candidate_certificate import Refutation, least_for_total
 from .quotas import Quotas, RegionFloors
 
 _STATUS: dict[CellStatus, Literal["proved", "survived", "cut"]] = {
@@ -20,6 +20,8 @@ _STATUS: dict[CellStatus, Literal["proved", "survived", "cut"]] = {
     CellStatus.CUT: "cut",
 }
 
+# Whoever checks looks at all multisets of no more cells than these.
+_LOOKED_AT = 2
 # Share of the work for a search that leaves floors of regions out, where there are any.
 _WITHOUT_FLOORS = 0.8
 
@@ -70,6 +72,7 @@ class BoundQuestion:
         sample_area_m2: Area that each of them stands for.
         n_existing: Existing devices.
         n_free: Samples that these cover.
+        wanted: Which samples are neither free nor out of reach, (n_samples,).
     """
 
     required: int
@@ -80,6 +83,7 @@ class BoundQuestion:
     n_free: int = 0
     floors: tuple[int, ...] = ()
     regions: NDArray[np.int64] | None = None
+    wanted: NDArray[np.bool_] | None = None
 
     @classmethod
     def about(
@@ -107,6 +111,7 @@ class BoundQuestion:
             n_free,
             tuple(floors.tolist()),
             regions.row[reached & ~free],
+            reached & ~free,
         )
 
     def searched(
@@ -176,6 +181,24 @@ class ContinuousBound:
             n_cells=found.cells_used,
             one_fewer_upper_bound_m2=(most + question.n_free) * question.sample_area_m2,
         )
+
+    def refutation(self) -> Refutation | None:
+        """Return what the bound can be followed from; None: nothing.
+
+        Floors of regions aren't followed, nor multisets of three cells and more: of
+        these, what multipliers prove.
+        """
+        found, wanted = self.found, self.question.wanted
+        if wanted is None or found.problem.required_total is not None:
+            return None
+        least = min(found.lower_bound, max(found.by_multipliers, _LOOKED_AT + 1.0))
+        if not 1.0 <= least < np.inf:
+            return None
+        multipliers = np.zeros(len(wanted), dtype=np.int64)
+        # Of one cell, multipliers that are all alike look at each.
+        alike = least == _LOOKED_AT and found.by_multipliers < least
+        multipliers[wanted] = 1 if alike else found.multipliers
+        return Refutation(int(least) - 1, multipliers)
 
 
 def with_existing_alone(certificate: Certificate, n_reached: int) -> Certificate:

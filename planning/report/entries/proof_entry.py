@@ -1,4 +1,4 @@
-"""What travels with a plan so that others can derive its bounds over candidates."""
+"""What travels with a plan so that others can derive its bounds."""
 
 from collections.abc import Iterable
 
@@ -10,7 +10,8 @@ from planning.model.document.certificates import (
     Certificates,
     ProofRecord,
 )
-from planning.model.proofs import CoverProof, ProofFile
+from planning.model.proofs import CoverProof, PoseProof, ProofFile
+from planning.proofs.candidate_certificate import Refutation
 from planning.proofs.quotas import required_samples
 from planning.proofs.selection import cover_problem
 from planning.report.partial_plan import PartialPlan
@@ -51,19 +52,29 @@ def with_proofs(
             _frozen(scene, candidates.samples, _projector_draws()),
             candidates.lit,
             limits.dominant_coverage,
+            partial.stage.refutation,
         ),
         "camera": (
             certificates.cameras,
             _frozen(scene, target, _camera_draws()) if _stand(partial) else None,
             cover.measured,
             limits.coverage,
+            partial.camera_stage.refutation,
         ),
     }
     proofs: dict[str, CoverProof] = {}
+    over_poses: dict[str, PoseProof] = {}
     changed: dict[str, Certificate] = {}
-    for kind, (claims, frozen, covers, share) in stated.items():
+    for kind, (claims, frozen, covers, share, refutation) in stated.items():
         if claims is None or frozen is None or not claims.needed.lower_bound:
             continue
+        everywhere = claims.continuous
+        if everywhere is not None and refutation is not None:
+            over_poses[kind] = made = _over_poses(frozen, refutation)
+            if made.n_devices + 1 + claims.given >= everywhere.lower_bound:
+                everywhere = everywhere.changed(certificate="proved")
+                claims = claims.changed(continuous=everywhere)
+                changed[f"{kind}s"] = claims
         proof = _proof(claims, frozen, covers, share)
         if proof is not None:
             proofs[kind] = proof
@@ -72,7 +83,7 @@ def with_proofs(
                 changed[f"{kind}s"] = claims.changed(candidates=bound)
     if not changed:
         return certificates, None
-    file = ProofFile.of(proofs)
+    file = ProofFile.of(proofs, over_poses)
     record = ProofRecord(path="proof.npz", sha256=file.sha256)
     return certificates.changed(**changed, proof=record), file
 
@@ -84,6 +95,15 @@ def _stand(partial: PartialPlan) -> bool:
         np.allclose(light.offsets, light_on(p, lit.target).offsets, rtol=0, atol=_MOVED)
         for light, p in zip(lit.lights, projectors, strict=True)
     )
+
+
+def _over_poses(frozen: "_Frozen", refutation: Refutation) -> PoseProof:
+    """Return the certificate over all poses, of all samples up to its last one."""
+    draws, points, faces, where = frozen
+    n, rest = len(refutation.multipliers), where[len(refutation.multipliers) :]
+    every = np.zeros(rest[0] if len(rest) else len(points), dtype=np.int64)
+    every[where[:n]] = refutation.multipliers
+    return PoseProof(draws, faces, refutation.n_devices, every)
 
 
 _Ints = NDArray[np.int64]

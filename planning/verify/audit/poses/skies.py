@@ -1,0 +1,194 @@
+"""Maps of the directions in which a device can't serve a sample, and how far they last.
+
+The sky of a sample is drawn flat about its normal N: a direction at an angle t from N
+lies t away from the middle, on its own side. On that map directions are no nearer than
+on the sphere, and within the cap of t <= T < pi/2, which holds all that matters, at
+most T / sin T times as far. So a cell that is seen within psi of u lies on the map
+within psi T / sin T of u, or of the point of the cap that is nearest to u.
+
+A pixel is closed if all of it is: outside of the cap, too nearly along T1, or blocked.
+Pixels that no outline comes near fall into pieces, and of a piece all directions are
+blocked or none is: one ray decides. The same is asked of faces near the sample alone,
+since outlines that these hide open nothing. Of each pixel the map holds how far the
+nearest is that isn't closed; cells within that are closed.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation, distance_transform_edt, label
+
+from geometry.arrays import Array, Ints, Mask
+from geometry.parallel import mapped
+from geometry.rays.rays import RayCaster
+from planning.verify.audit.audit_samples import AuditSamples
+
+from .outlines import Outlines
+from .sphere_cells import Cells
+
+# Pixels from the middle to the rim of the cap, and beyond it.
+_CAP, _BEYOND = 60, 4
+# Half a pixel's diagonal, and how far apart directions along an outline are drawn [px].
+_HALF, _STEP = 0.5**0.5, 0.9
+# Shares of the size of the mesh: of faces within these, outlines are drawn alone too.
+_NEAR = (0.04, 0.16)
+_FARTHEST = 255
+_AROUND = np.ones((3, 3), dtype=bool)
+
+
+@dataclass(frozen=True, eq=False)
+class Skies:
+    """The maps of samples.
+
+    Attributes:
+        cap: T, the largest incidence [rad].
+        frames: Two directions across N, and N, of each sample, (n, 3, 3).
+        radii: Pixels to the nearest that isn't closed, rounded down, (n, s, s).
+    """
+
+    cap: float
+    frames: Array
+    radii: NDArray[np.uint8]
+
+    def leave_open(
+        self, served: Mask, cells: Cells, psi: Array, points: Array | None
+    ) -> None:
+        """Strike what no place of a cell can serve, of (cells, samples), in place."""
+        at, k = np.nonzero(served)
+        closed = self.closed(k, cells.towards(points, at, k), psi[at, k])
+        served[at[closed], k[closed]] = False
+
+    def closed(self, samples: Ints, towards: Array, psi: Array) -> Mask:
+        """Return which samples no place of a cell can serve, each with its cell.
+
+        Cells are seen within psi (k,) of unit directions (k, 3).
+        """
+        local = np.einsum("kij,kj->ki", self.frames[samples], towards)
+        at = _pixels(_flat(local, self.cap, clamped=True))
+        pixel = self.cap / _CAP
+        reach = psi * self.cap / np.sin(self.cap) / pixel + 2.0 * _HALF
+        return self.radii[samples, at[:, 0], at[:, 1]] > reach
+
+
+def skies_of(
+    samples: AuditSamples,
+    caster: RayCaster,
+    cap: float,
+    tangent: float,
+    touching_m: float,
+    *,
+    blocking: bool,
+    tick: Callable[[], None],
+) -> Skies:
+    """Draw the maps of samples.
+
+    Args:
+        samples: Of the caster's mesh.
+        caster: Of the mesh that blocks.
+        cap: Largest incidence, below a right angle [rad].
+        tangent: Least angle to the line of T1 [rad].
+        touching_m: Faces that come nearer to a sample block nothing of it.
+        blocking: Whether any do.
+        tick: Called after each sample.
+    """
+    outlines = Outlines(caster.mesh)
+    frames = np.stack([_frame(normal) for normal in samples.normals])
+    side = 2 * (_CAP + _BEYOND) + 1
+    radii = np.zeros((len(samples), side, side), dtype=np.uint8)
+    offsets = (np.indices((side, side)) - (_CAP + _BEYOND)).reshape(2, -1).T
+    pixel = cap / _CAP
+    off = pixel * np.linalg.norm(offsets, axis=1)
+    share = np.where(off > 0.0, np.sin(off) / np.where(off > 0.0, off, 1.0), 1.0)
+    local = np.column_stack([share[:, None] * pixel * offsets, np.cos(off)])
+    inside = off <= cap + _HALF * pixel
+    drawn = (off <= cap + 1.5 * pixel).reshape(side, side)
+
+    def draw(k: int) -> None:
+        closed = ~inside
+        along = np.abs(local @ (frames[k] @ samples.steep[k]))
+        closed |= along > np.cos(max(0.0, tangent - _HALF * pixel))
+        if blocking:
+            sky = _Sky(outlines, caster, samples.points[k], int(samples.faces[k]))
+            closed |= sky.blocked(frames[k], local, drawn, cap, touching_m)
+        far = distance_transform_edt(closed.reshape(side, side))
+        radii[k] = np.minimum(np.floor(far), _FARTHEST)
+        tick()
+
+    mapped(draw, range(len(samples)), caster.threads)
+    return Skies(cap, frames, radii)
+
+
+@dataclass(frozen=True, eq=False)
+class _Sky:
+    """What a mesh blocks of one sample."""
+
+    outlines: Outlines
+    caster: RayCaster
+    point: Array
+    face: int
+
+    def blocked(
+        self, frame: Array, local: Array, drawn: Mask, cap: float, touching_m: float
+    ) -> Mask:
+        """Return which pixels are blocked for sure; those of `drawn` are looked at."""
+        sides = self.outlines.sides(self.point)
+        others = np.ones(len(sides), dtype=bool)
+        others[self.face] = False
+        others[self.outlines.touching(self.point, sides, touching_m)] = False
+        mesh = self.caster.mesh
+        away = np.linalg.norm(mesh.vertices - self.point, axis=1)[mesh.faces].max(axis=1)
+        blocked = np.zeros(drawn.size, dtype=bool)
+        for share in (*_NEAR, np.inf):
+            some = others & (away <= share * self.outlines.size)
+            if not some.any():
+                continue
+            pieces, count = self._pieces(frame, drawn, cap, sides, some)
+            place = np.full(count + 1, -1)
+            within = np.flatnonzero(pieces)
+            place[pieces[within]] = within
+            rays = local[place[1:]] @ frame
+            hit, _ = self.caster.first_hits(self.point + touching_m * rays, rays)
+            shut = np.concatenate([[False], (hit >= 0) & some[hit]])
+            blocked |= shut[pieces]
+        return blocked
+
+    def _pieces(
+        self, frame: Array, drawn: Mask, cap: float, sides: Array, some: Mask
+    ) -> tuple[Ints, int]:
+        """Number the pieces of pixels that no outline comes near, from 1; 0: others."""
+        pixel = cap / _CAP
+        rim = cap + 3.0 * pixel
+        step = _STEP * pixel * np.sin(rim) / rim
+        edges = self.outlines.of_faces(sides, some)
+        sky = self.outlines.arcs(self.point, edges, step) @ frame.T
+        sky = sky[sky[:, 2] >= np.cos(rim)]
+        at = _pixels(_flat(sky, cap))
+        touched = np.zeros(drawn.shape, dtype=bool)
+        touched[at[:, 0], at[:, 1]] = True
+        free = drawn & ~binary_dilation(touched, _AROUND)
+        pieces = np.zeros(drawn.shape, dtype=np.int32)
+        count = label(free, output=pieces)
+        return pieces.ravel().astype(np.int64), int(count)
+
+
+def _flat(local: Array, cap: float, *, clamped: bool = False) -> Array:
+    """Return where directions (n, 3) lie on the map, (n, 2) [px]."""
+    across = np.hypot(local[:, 0], local[:, 1])
+    off = np.arctan2(across, local[:, 2])
+    if clamped:
+        off = np.minimum(off, cap)
+    scale = off * _CAP / cap / np.where(across > 0.0, across, 1.0)
+    return scale[:, None] * local[:, :2]
+
+
+def _pixels(flat: Array) -> Ints:
+    return np.rint(flat).astype(np.int64) + _CAP + _BEYOND
+
+
+def _frame(normal: Array) -> Array:
+    spare = np.eye(3)[np.argmin(np.abs(normal))]
+    across = np.cross(normal, spare)
+    across /= np.linalg.norm(across)
+    return np.stack([across, np.cross(normal, across), normal])
