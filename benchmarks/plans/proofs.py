@@ -34,10 +34,11 @@ from planning.model.plan import RigPlan
 from planning.proofs.selection import cover_problem
 from planning.verify.audit.audit_case import AuditCase, DeviceKind, examine
 from planning.verify.audit.audit_findings import AuditFindings
-from planning.verify.audit.proofs.proof_claims import (
-    audit_proofs,
+from planning.verify.audit.proofs.frozen_samples import (
     covered_by_candidates,
+    drawn_again,
 )
+from planning.verify.audit.proofs.proof_claims import audit_proofs
 from solvers import solve_cover
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -123,7 +124,8 @@ def _rows(plan: RigPlan) -> Iterator[tuple[list[str], bool]]:
             continue
         proof = plan.proof.proofs[kind.name]
         raised = _refused(case, kind)
-        covers = covered_by_candidates(case, kind.name, proof)
+        samples = drawn_again(case, proof.draws, proof.faces)
+        covers = covered_by_candidates(case, kind.name, samples)
         required = int(np.ceil(kind.share * int(covers.any(axis=1).sum()) - 1e-9))
         found = _highs(covers, required, least - 1)
         yield (

@@ -70,6 +70,13 @@ class Outlines:
         alone = (here != there) | (n_faces != 2)
         return np.flatnonzero((here | there) & (folded | alone))
 
+    def above(self, point: Array, normal: Array, edges: Ints) -> Mask:
+        """Return which edges have an end before the plane of a point, (k,)."""
+        height = (self.mesh.vertices - point) @ normal
+        begin, end = self.mesh.edges.ends[edges].T
+        above: Mask = (height[begin] > 0.0) | (height[end] > 0.0)
+        return above
+
     def arcs(self, point: Array, edges: Ints, step: float) -> Array:
         """Return directions from a point along edges, no two neighbours further apart.
 

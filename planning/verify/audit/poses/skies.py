@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation, distance_transform_edt, label
+from scipy.ndimage import distance_transform_edt, label
 
 from geometry.arrays import Array, Ints, Mask
 from geometry.parallel import mapped
@@ -35,7 +35,8 @@ _HALF, _STEP = 0.5**0.5, 0.9
 # Shares of the size of the mesh: of faces within these, outlines are drawn alone too.
 _NEAR = (0.04, 0.16)
 _FARTHEST = 255
-_AROUND = np.ones((3, 3), dtype=bool)
+# Samples after whose maps a word is said.
+_TOLD = 256
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,17 +73,8 @@ class Skies:
         return self.radii[samples, at[:, 0], at[:, 1]] > reach
 
 
-def skies_of(
-    samples: AuditSamples,
-    caster: RayCaster,
-    cap: float,
-    tangent: float,
-    touching_m: float,
-    *,
-    blocking: bool,
-    tick: Callable[[], None],
-) -> Skies:
-    """Draw the maps of samples.
+class SkyMaps:
+    """Draws the maps of samples, each once.
 
     Args:
         samples: Of the caster's mesh.
@@ -90,34 +82,58 @@ def skies_of(
         cap: Largest incidence, below a right angle [rad].
         tangent: Least angle to the line of T1 [rad].
         touching_m: Faces that come nearer to a sample block nothing of it.
-        blocking: Whether any do.
-        tick: Called after each sample.
     """
-    outlines = Outlines(caster.mesh)
-    frames = np.stack([_frame(normal) for normal in samples.normals])
-    side = 2 * (_CAP + _BEYOND) + 1
-    radii = np.zeros((len(samples), side, side), dtype=np.uint8)
-    offsets = (np.indices((side, side)) - (_CAP + _BEYOND)).reshape(2, -1).T
-    pixel = cap / _CAP
-    off = pixel * np.linalg.norm(offsets, axis=1)
-    share = np.where(off > 0.0, np.sin(off) / np.where(off > 0.0, off, 1.0), 1.0)
-    local = np.column_stack([share[:, None] * pixel * offsets, np.cos(off)])
-    inside = off <= cap + _HALF * pixel
-    drawn = (off <= cap + 1.5 * pixel).reshape(side, side)
 
-    def draw(k: int) -> None:
-        closed = ~inside
-        along = np.abs(local @ (frames[k] @ samples.steep[k]))
-        closed |= along > np.cos(max(0.0, tangent - _HALF * pixel))
-        if blocking:
-            sky = _Sky(outlines, caster, samples.points[k], int(samples.faces[k]))
-            closed |= sky.blocked(frames[k], local, drawn, cap, touching_m)
-        far = distance_transform_edt(closed.reshape(side, side))
-        radii[k] = np.minimum(np.floor(far), _FARTHEST)
-        tick()
+    def __init__(
+        self,
+        samples: AuditSamples,
+        caster: RayCaster,
+        cap: float,
+        tangent: float,
+        touching_m: float,
+    ) -> None:
+        self._samples, self._caster, self._cap = samples, caster, cap
+        self._tangent, self._touching_m = tangent, touching_m
+        self._outlines = Outlines(caster.mesh)
+        frames = [_frame(normal) for normal in samples.normals]
+        self._frames = np.array(frames).reshape(-1, 3, 3)
+        self._done = np.zeros(len(samples), dtype=bool)
+        side = 2 * (_CAP + _BEYOND) + 1
+        self._radii = np.zeros((len(samples), side, side), dtype=np.uint8)
+        offsets = (np.indices((side, side)) - (_CAP + _BEYOND)).reshape(2, -1).T
+        self._pixel = pixel = cap / _CAP
+        self._off = off = pixel * np.linalg.norm(offsets, axis=1)
+        share = np.sinc(off / np.pi)[:, None] * pixel
+        self._local = np.column_stack([share * offsets, np.cos(off)])
 
-    mapped(draw, range(len(samples)), caster.threads)
-    return Skies(cap, frames, radii)
+    def of(self, some: Ints, say: Callable[[str], None]) -> Skies:
+        """Return the maps of some of the samples, by their numbers."""
+        missing = some[~self._done[some]]
+        parts = range(0, len(missing), _TOLD)
+        for begin in parts:
+            part = missing[begin : begin + _TOLD].tolist()
+            mapped(self._draw, part, self._caster.threads)
+            say(f"shadows of {begin + len(part)} of {len(missing)} samples")
+        self._done[some] = True
+        return Skies(self._cap, self._frames[some], self._radii[some])
+
+    def _draw(self, k: int) -> None:
+        pixel, samples = self._pixel, self._samples
+        closed = self._off > self._cap + _HALF * pixel
+        along = np.abs(self._local @ (self._frames[k] @ samples.steep[k]))
+        closed |= along > np.cos(max(0.0, self._tangent - _HALF * pixel))
+        side = self._radii.shape[1:]
+        drawn = (self._off <= self._cap + 1.5 * pixel).reshape(side)
+        sky = _Sky(
+            self._outlines,
+            self._caster,
+            samples.points[k],
+            int(samples.faces[k]),
+            self._touching_m,
+        )
+        closed |= sky.blocked(self._frames[k], self._local, drawn, self._cap)
+        far = distance_transform_edt(closed.reshape(side))
+        self._radii[k] = np.minimum(np.floor(far), _FARTHEST)
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,17 +144,18 @@ class _Sky:
     caster: RayCaster
     point: Array
     face: int
+    touching_m: float
 
-    def blocked(
-        self, frame: Array, local: Array, drawn: Mask, cap: float, touching_m: float
-    ) -> Mask:
+    def blocked(self, frame: Array, local: Array, drawn: Mask, cap: float) -> Mask:
         """Return which pixels are blocked for sure; those of `drawn` are looked at."""
         sides = self.outlines.sides(self.point)
         others = np.ones(len(sides), dtype=bool)
         others[self.face] = False
-        others[self.outlines.touching(self.point, sides, touching_m)] = False
+        others[self.outlines.touching(self.point, sides, self.touching_m)] = False
         mesh = self.caster.mesh
-        away = np.linalg.norm(mesh.vertices - self.point, axis=1)[mesh.faces].max(axis=1)
+        away = np.linalg.norm(mesh.vertices - self.point, axis=1)
+        a, b, c = mesh.faces.T
+        away = np.maximum(np.maximum(away[a], away[b]), away[c])
         blocked = np.zeros(drawn.size, dtype=bool)
         for share in (*_NEAR, np.inf):
             some = others & (away <= share * self.outlines.size)
@@ -149,7 +166,7 @@ class _Sky:
             within = np.flatnonzero(pieces)
             place[pieces[within]] = within
             rays = local[place[1:]] @ frame
-            hit, _ = self.caster.first_hits(self.point + touching_m * rays, rays)
+            hit, _ = self.caster.first_hits(self.point + self.touching_m * rays, rays)
             shut = np.concatenate([[False], (hit >= 0) & some[hit]])
             blocked |= shut[pieces]
         return blocked
@@ -162,12 +179,16 @@ class _Sky:
         rim = cap + 3.0 * pixel
         step = _STEP * pixel * np.sin(rim) / rim
         edges = self.outlines.of_faces(sides, some)
+        edges = edges[self.outlines.above(self.point, frame[2], edges)]
         sky = self.outlines.arcs(self.point, edges, step) @ frame.T
         sky = sky[sky[:, 2] >= np.cos(rim)]
         at = _pixels(_flat(sky, cap))
         touched = np.zeros(drawn.shape, dtype=bool)
         touched[at[:, 0], at[:, 1]] = True
-        free = drawn & ~binary_dilation(touched, _AROUND)
+        # A direction between two that were drawn is at most a pixel aside.
+        for axis in (0, 1):
+            touched |= np.roll(touched, 1, axis) | np.roll(touched, -1, axis)
+        free = drawn & ~touched
         pieces = np.zeros(drawn.shape, dtype=np.int32)
         count = label(free, output=pieces)
         return pieces.ravel().astype(np.int64), int(count)

@@ -63,9 +63,8 @@ class Question:
     object_m: float
     tick: Callable[[int], None]
 
-    def by_multipliers(self, n_devices: int, least: int, multipliers: Ints) -> Outcome:
-        """Split cells until no pose serves more than so many may."""
-        most = most_of_one(n_devices, least, multipliers)
+    def by_multipliers(self, most: int, multipliers: Ints) -> Outcome:
+        """Split cells until no pose serves samples of more than `most` together."""
         if most < 0:
             return Outcome(False, "its multipliers ask for nothing")
         waiting = self._costly(self.roots, None, multipliers, most)
