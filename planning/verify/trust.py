@@ -3,12 +3,13 @@
 Keys are dotted, `*` stands for any name or number; a key stands for all below it.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 from typing import Any
 
 from geometry.mesh.mesh import TriangleMesh
 from planning.model.plan import RigPlan
+from planning.verify.audit.poses.pose_claims import PoseBound
 
 from .held_figures import EXACTLY
 
@@ -52,10 +53,12 @@ def is_under(key: str, patterns: Mapping[str, str]) -> bool:
     )
 
 
+OVER_POSES = "bounds over all poses: not derived again, which --proofs does"
+
 # Claims that the audit holds against others, but doesn't recompute; by what they say.
 ON_TRUST = {
-    "bounds over all poses, and what other numbers of devices cover at most": (
-        "certificates.*.continuous",
+    OVER_POSES: ("certificates.*.continuous",),
+    "the numbers needed, and what other numbers of devices cover at most": (
         "certificates.*.needed",
         "certificates.*.by_count",
         "certificates.*.best_area",
@@ -109,6 +112,7 @@ def taken_on_trust(
     mesh: TriangleMesh | None,
     claims_held: str,
     figures_held: str,
+    over_poses: Sequence[PoseBound] | None = None,
 ) -> tuple[str, ...]:
     """Return what was believed of a plan, a line each; () where nothing was.
 
@@ -117,12 +121,15 @@ def taken_on_trust(
         mesh: What its surface was compared with; None: with nothing.
         claims_held: How closely its claims were held, "" where they weren't again.
         figures_held: The same of the figures of its check.
+        over_poses: What became of bounds over all poses; None: nothing was tried.
     """
     keys = list(_keys(plan.to_document()))
     lines: list[str] = []
     for what, patterns in ON_TRUST.items():
         named = dict.fromkeys(patterns, what)
-        if any(is_under(key, named) for key in keys):
+        if what == OVER_POSES and over_poses is not None:
+            lines += [bound.trusted for bound in over_poses if bound.trusted]
+        elif any(is_under(key, named) for key in keys):
             lines.append(what)
     for kind in ("projectors", "cameras"):
         proof = getattr(plan.document.certificates, kind)

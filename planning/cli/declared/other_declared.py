@@ -56,6 +56,11 @@ _SECTIONS = {
     is_flag=True,
     help="Exit 1 if anything is taken on trust, too: what that is, is always told.",
 )
+@click.option(
+    "--proofs",
+    is_flag=True,
+    help="Derive the bounds over all poses again, too, which may take minutes.",
+)
 @rendering_options
 @threads_option
 @output_options

@@ -61,7 +61,9 @@ class Lens:
 
 def _farthest_corner(device: PinholeModel) -> float:
     width, height = device.resolution
-    corners = np.array([[u, v] for u in (-0.5, width - 0.5) for v in (-0.5, height - 0.5)])
+    corners = np.array(
+        [[u, v] for u in (-0.5, width - 0.5) for v in (-0.5, height - 0.5)]
+    )
     focal = np.diag(device.camera_matrix)[:2]
     slopes = (corners - device.camera_matrix[:2, 2]) / focal
     return float(np.arctan(np.linalg.norm(slopes, axis=1).max()))
@@ -111,7 +113,9 @@ class LitBy:
         width = np.linalg.norm(line, axis=1)
         line = line / np.where(width > 0.0, width, 1.0)[:, None]
         noise = limits.noise_px / np.maximum(-dot(normals, light), _ROUNDING)
-        placed = np.hypot(_moved(projector, points, m, limits), limits.ring_sigma_m or 0.0)
+        placed = np.hypot(
+            _moved(projector, points, m, limits), limits.ring_sigma_m or 0.0
+        )
         spacing = projector.ring_spacing(points)
         return cls(lit, m, False, width, line, spacing, noise, placed)
 
@@ -124,7 +128,9 @@ def _moved(
     if errors is None or limits.accuracy_of != "total":
         return np.zeros(len(points))
     pose = projector.world_from_device
-    longer, per_px = projector.light.panel_shifts(in_frame(pose, points), m @ pose[:3, :3])
+    longer, per_px = projector.light.panel_shifts(
+        in_frame(pose, points), m @ pose[:3, :3]
+    )
     turned = np.linalg.norm(cross(points - pose[:3, 3], m), axis=1)
     return np.sqrt(
         (errors.angle**2 * turned**2 + errors.position_m**2) / 3.0

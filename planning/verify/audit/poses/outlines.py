@@ -97,6 +97,8 @@ class Outlines:
         swept = np.arctan2(start + length, off) - first
         steps = np.maximum(np.ceil(swept / step), 1.0).astype(np.int64)
         of = np.repeat(np.arange(len(edges)), steps + 1)
-        place = np.arange(len(of)) - np.repeat(np.cumsum(steps + 1) - steps - 1, steps + 1)
+        place = np.arange(len(of)) - np.repeat(
+            np.cumsum(steps + 1) - steps - 1, steps + 1
+        )
         angle = first[of] + swept[of] * place / steps[of]
         return np.cos(angle)[:, None] * foot[of] + np.sin(angle)[:, None] * way[of]

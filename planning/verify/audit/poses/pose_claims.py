@@ -35,11 +35,11 @@ class PoseBound:
 
     Attributes:
         line: It, in words.
-        derived: Whether all that the plan says of it was derived again.
+        trusted: What of it wasn't derived again; "": nothing.
     """
 
     line: str
-    derived: bool
+    trusted: str = ""
 
 
 def audit_pose_proofs(
@@ -50,102 +50,107 @@ def audit_pose_proofs(
     A certificate that isn't of what the plan claims is a false claim. What cells of the
     smallest size leave open is no such thing, and called claimed.
     """
-    record, bounds = case.plan.document.certificates.proof, list[PoseBound]()
-    file = case.plan.proof if record is not None else None
-    for kind in case.kinds:
-        table, name = kind.proof.continuous, f"{kind.name}s"
-        if table is None:
-            continue
-        told = f"{name}: at least {table.lower_bound} over all poses is"
-        given = len(case.plan.requirements.existing_of(kind.name))
-        if table.lower_bound <= given:
-            bounds.append(PoseBound(f"{told} proved: so many stand already", True))
-            continue
-        if table.certificate != "proved":
-            words = f"{told} claimed, without a certificate"
-            bounds.append(PoseBound(words, False))
-            continue
-        below = findings.at(f"certificates.{name}.continuous.certificate")
-        if record is None:
-            below.fail("", "'proved' is claimed, and no proof is named")
-            continue
-        if file is None:
-            words = f"{told} claimed: {record.path} isn't beside the plan"
-            bounds.append(PoseBound(words, False))
-            continue
-        begun = time.perf_counter()
-        try:
-            proof = _of_claim(file.over_poses.get(kind.name), table, given)
-            found = _derived(case, kind, table, proof, given, say)
-        except RefutedProofError as error:
-            least = table.lower_bound
-            below.fail("", f"{least} are claimed to be proved, but {error}")
-            continue
-        how = "claimed"
-        if found[0]:
-            how = f"proved, derived again in {time.perf_counter() - begun:.1f} s"
-        bounds.append(PoseBound(f"{told} {how}: {found[1]}", found[2]))
-    return tuple(bounds)
+    bounds = [_bound_of(case, kind, findings, say) for kind in case.kinds]
+    return tuple(bound for bound in bounds if bound is not None)
 
 
-def _of_claim(
-    proof: PoseProof | None, table: ContinuousProof, given: int
-) -> PoseProof:
-    if proof is None:
-        raise RefutedProofError("the file has no certificate of it")
-    if proof.n_devices + 1 + given < table.lower_bound:
-        raise RefutedProofError(f"the certificate is of {proof.n_devices + 1 + given}")
-    return proof
+def _bound_of(
+    case: AuditCase,
+    kind: DeviceKind,
+    findings: AuditFindings,
+    say: Callable[[str], None],
+) -> PoseBound | None:
+    """Return what became of a kind's bound; None: it has none, or a false one."""
+    table, name = kind.proof.continuous, f"{kind.name}s"
+    if table is None:
+        return None
+    told = f"{name}: at least {table.lower_bound} over all poses is"
+    trusted = f"the bound on {name} over all poses: claimed"
+    if table.lower_bound <= _given(case, kind):
+        return PoseBound(f"{told} proved: so many stand already")
+    if table.certificate != "proved":
+        return PoseBound(f"{told} claimed, without a certificate", trusted)
+    record = case.plan.document.certificates.proof
+    below = findings.at(f"certificates.{name}.continuous.certificate")
+    if record is None:
+        below.fail("", "'proved' is claimed, and no proof is named")
+        return None
+    if case.plan.proof is None:
+        return PoseBound(
+            f"{told} claimed: {record.path} isn't beside the plan", trusted
+        )
+    begun = time.perf_counter()
+    try:
+        proof = case.plan.proof.over_poses.get(kind.name)
+        outcome, only_count = _derived(case, kind, table, proof, say)
+    except RefutedProofError as error:
+        below.fail("", f"{table.lower_bound} are claimed to be proved, but {error}")
+        return None
+    if not outcome.too_few:
+        return PoseBound(f"{told} claimed: {outcome.how}", trusted)
+    took = time.perf_counter() - begun
+    line = f"{told} proved, derived again in {took:.1f} s: {outcome.how}"
+    if only_count:
+        trusted = (
+            f"what one of the {name} fewer covers at most, over all poses: claimed"
+        )
+        return PoseBound(f"{line}; what one fewer covers is claimed", trusted)
+    return PoseBound(line)
+
+
+def _given(case: AuditCase, kind: DeviceKind) -> int:
+    return len(case.plan.requirements.existing_of(kind.name))
 
 
 def _derived(
     case: AuditCase,
     kind: DeviceKind,
     table: ContinuousProof,
-    proof: PoseProof,
-    given: int,
+    proof: PoseProof | None,
     say: Callable[[str], None],
-) -> tuple[bool, str, bool]:
-    """Return whether the bound was derived, how, and whether its area was as well."""
-    every = drawn_again(case, proof.draws, proof.faces)
-    n = len(proof.multipliers)
+) -> tuple[Outcome, bool]:
+    """Return whether the bound follows and how, and whether its area doesn't.
+
+    Raises:
+        RefutedProofError: If the certificate is of something else.
+    """
+    given = _given(case, kind)
+    if proof is None:
+        raise RefutedProofError("the file has no certificate of it")
+    if proof.n_devices + 1 + given < table.lower_bound:
+        raise RefutedProofError(f"the certificate is of {proof.n_devices + 1 + given}")
+    every, n = drawn_again(case, proof.draws, proof.faces), len(proof.multipliers)
     lit_by = lit_by_plan(case, kind.name, every)
-    spoken_of = np.any(lit_by, axis=0)
-    n_samples = int(spoken_of[:n].sum())
+    lit = np.any(lit_by, axis=0)
+    n_samples = int(lit[:n].sum())
     if abs(n_samples - table.n_samples) > _LIT * n:
         raise RefutedProofError(
             f"it is of {n_samples} samples, and {table.n_samples} are claimed"
         )
-    samples, lit_by = every.take(np.arange(n)), lit_by[:, :n]
+    samples = every.take(np.arange(n))
     reached = covered_by_candidates(case, kind.name, samples).any(axis=1)
     free = reached & free_of_existing(case, kind.name, samples)
     required = int(np.ceil(kind.share * int(reached.sum()) - 1e-9)) - int(free.sum())
-    wanted = np.flatnonzero(reached & ~free)
     search = _Search(
-        device_cells(case, kind.name, samples, lit_by, shadows=table.occlusion),
+        device_cells(case, kind.name, samples, lit_by[:, :n], shadows=table.occlusion),
         proof.multipliers,
-        wanted,
+        np.flatnonzero(reached & ~free),
         lambda line: say(f"proofs: {kind.name}s: {line}"),
     )
-    n_devices = table.lower_bound - given - 1
-    outcome = search.too_few(n_devices, required)
-    if not outcome.too_few:
-        return False, outcome.how, False
-    words = (
-        f"no {n_devices} anywhere serve {required} of {len(wanted)} samples "
-        f"({outcome.how})"
-    )
+    few = table.lower_bound - given - 1
+    found = search.too_few(few, required)
+    if not found.too_few:
+        return found, True
+    words = f"no {few} anywhere cover {required} of {n_samples} samples ({found.how})"
+    found = Outcome(True, words)
     if table.one_fewer_upper_bound_m2 is None:
-        return True, words, True
-    # Area that a sample stands for, and how many are claimed to be served at most.
-    shares = float(spoken_of.sum()) / len(every) / max(n_samples, 1)
-    area = case.estimator.target_m2 * shares
+        return found, False
+    # Area that a sample stands for, and how many are claimed to be covered at most.
+    area = case.estimator.target_m2 * float(lit.mean()) / max(n_samples, 1)
     most = round(table.one_fewer_upper_bound_m2 / area) - int(free.sum())
     fewer = kind.proof.needed.count - given - 1
-    known = fewer <= n_devices and most + 1 >= required
-    if known or most >= len(wanted) or search.too_few(fewer, most + 1).too_few:
-        return True, words, True
-    return True, f"{words}; what one fewer than needed serves is claimed", False
+    known = (fewer <= few and most + 1 >= required) or most >= len(search.wanted)
+    return found, not (known or search.too_few(fewer, most + 1).too_few)
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, label
 
-from geometry.arrays import Array, Ints, Mask
+from geometry.arrays import Array, Ints, Mask, cross
 from geometry.parallel import mapped
 from geometry.rays.rays import RayCaster
 from planning.verify.audit.audit_samples import AuditSamples
@@ -132,7 +132,7 @@ class SkyMaps:
             self._touching_m,
         )
         closed |= sky.blocked(self._frames[k], self._local, drawn, self._cap)
-        far = distance_transform_edt(closed.reshape(side))
+        far: Array = np.asarray(distance_transform_edt(closed.reshape(side)))
         self._radii[k] = np.minimum(np.floor(far), _FARTHEST)
 
 
@@ -190,8 +190,8 @@ class _Sky:
             touched |= np.roll(touched, 1, axis) | np.roll(touched, -1, axis)
         free = drawn & ~touched
         pieces = np.zeros(drawn.shape, dtype=np.int32)
-        count = label(free, output=pieces)
-        return pieces.ravel().astype(np.int64), int(count)
+        label(free, output=pieces)
+        return pieces.ravel().astype(np.int64), int(pieces.max())
 
 
 def _flat(local: Array, cap: float, *, clamped: bool = False) -> Array:
@@ -210,6 +210,6 @@ def _pixels(flat: Array) -> Ints:
 
 def _frame(normal: Array) -> Array:
     spare = np.eye(3)[np.argmin(np.abs(normal))]
-    across = np.cross(normal, spare)
+    across = cross(normal, spare)
     across /= np.linalg.norm(across)
-    return np.stack([across, np.cross(normal, across), normal])
+    return np.stack([across, cross(normal, across), normal])

@@ -33,8 +33,9 @@ class Cells(NamedTuple):
     @classmethod
     def of_shell(cls, low_m: float, high_m: float) -> "Cells":
         """Return eight cells that hold a shell."""
-        place = np.arange(8)
-        polar, turn = 0.5 * np.pi * (place // 4), 0.5 * np.pi * (place % 4)
+        place = np.arange(8, dtype=np.float64)
+        polar: Array = 0.5 * np.pi * (place // 4)
+        turn: Array = 0.5 * np.pi * (place % 4)
         ends = np.full(8, low_m), np.full(8, high_m)
         return cls(*ends, polar, polar + 0.5 * np.pi, turn, turn + 0.5 * np.pi)
 
@@ -129,7 +130,8 @@ def seen_from(cells: Cells, points: Array, vectors: tuple[Array, ...]) -> Seen:
     for end in (low, high):
         there, rho = distance(end), 2.0 * end * np.sin(0.5 * angle)
         turned = np.arctan2(
-            np.abs(end - half) * off_axis, (end - beside) * (half - beside) + off_axis**2
+            np.abs(end - half) * off_axis,
+            (end - beside) * (half - beside) + off_axis**2,
         )
         share = np.divide(rho, there, out=np.ones_like(there), where=there > rho)
         psi = np.maximum(psi, turned + np.arcsin(share) + _ROUNDING)

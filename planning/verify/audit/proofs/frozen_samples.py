@@ -1,4 +1,4 @@
-"""The samples that a proof speaks of, drawn again, and what candidates cover of them."""
+"""The samples of a proof, drawn again, and what candidates cover of them."""
 
 import numpy as np
 
