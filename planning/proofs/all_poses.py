@@ -20,8 +20,6 @@ _STATUS: dict[CellStatus, Literal["proved", "survived", "cut"]] = {
     CellStatus.CUT: "cut",
 }
 
-# Whoever checks looks at all multisets of no more cells than these.
-_LOOKED_AT = 2
 # Share of the work for a search that leaves floors of regions out, where there are any.
 _WITHOUT_FLOORS = 0.8
 
@@ -183,22 +181,21 @@ class ContinuousBound:
         )
 
     def refutation(self) -> Refutation | None:
-        """Return what the bound can be followed from; None: nothing.
+        """Return by what others may derive the bound again; None: by nothing.
 
-        Floors of regions aren't followed, nor multisets of three cells and more: of
-        these, what multipliers prove.
+        Floors of regions aren't followed. Where multisets of cells were looked at, the
+        multipliers may yet prove as much over smaller cells.
         """
         found, wanted = self.found, self.question.wanted
         if wanted is None or found.problem.required_total is not None:
             return None
-        least = min(found.lower_bound, max(found.by_multipliers, _LOOKED_AT + 1.0))
-        if not 1.0 <= least < np.inf:
+        if not 1.0 <= found.lower_bound < np.inf:
             return None
+        n_devices = int(found.lower_bound) - 1
         multipliers = np.zeros(len(wanted), dtype=np.int64)
-        # Of one cell, multipliers that are all alike look at each.
-        alike = least == _LOOKED_AT and found.by_multipliers < least
-        multipliers[wanted] = 1 if alike else found.multipliers
-        return Refutation(int(least) - 1, multipliers)
+        # Of one device, multipliers that are all alike look at all that it covers.
+        multipliers[wanted] = 1 if n_devices == 1 else found.multipliers
+        return Refutation(n_devices, multipliers)
 
 
 def with_existing_alone(certificate: Certificate, n_reached: int) -> Certificate:

@@ -72,7 +72,7 @@ def with_proofs(
         if everywhere is not None and refutation is not None:
             over_poses[kind] = made = _over_poses(frozen, refutation)
             if made.n_devices + 1 + claims.given >= everywhere.lower_bound:
-                everywhere = everywhere.changed(certificate="proved")
+                everywhere = everywhere.changed(certificate="offered")
                 claims = claims.changed(continuous=everywhere)
                 changed[f"{kind}s"] = claims
         proof = _proof(claims, frozen, covers, share)

@@ -68,12 +68,12 @@ def _bound_of(
     trusted = f"the bound on {name} over all poses: claimed"
     if table.lower_bound <= _given(case, kind):
         return PoseBound(f"{told} proved: so many stand already")
-    if table.certificate != "proved":
+    if table.certificate == "none":
         return PoseBound(f"{told} claimed, without a certificate", trusted)
     record = case.plan.document.certificates.proof
     below = findings.at(f"certificates.{name}.continuous.certificate")
     if record is None:
-        below.fail("", "'proved' is claimed, and no proof is named")
+        below.fail("", "'offered' is claimed, and no proof is named")
         return None
     if case.plan.proof is None:
         return PoseBound(
@@ -84,7 +84,7 @@ def _bound_of(
         proof = case.plan.proof.over_poses.get(kind.name)
         outcome, only_count = _derived(case, kind, table, proof, say)
     except RefutedProofError as error:
-        below.fail("", f"{table.lower_bound} are claimed to be proved, but {error}")
+        below.fail("", f"{table.lower_bound} at least is claimed, but {error}")
         return None
     if not outcome.too_few:
         return PoseBound(f"{told} claimed: {outcome.how}", trusted)

@@ -66,11 +66,17 @@ class Skies:
 
         Cells are seen within psi (k,) of unit directions (k, 3).
         """
+        reach = psi / np.sin(self.cap) * _CAP + 2.0 * _HALF
+        return self._radius(samples, towards) > reach
+
+    def shut(self, samples: Ints, towards: Array) -> Mask:
+        """Return whether pixels are closed in which directions (k, 3) lie."""
+        return self._radius(samples, towards) > 0
+
+    def _radius(self, samples: Ints, towards: Array) -> NDArray[np.uint8]:
         local = np.einsum("kij,kj->ki", self.frames[samples], towards)
         at = _pixels(_flat(local, self.cap, clamped=True))
-        pixel = self.cap / _CAP
-        reach = psi * self.cap / np.sin(self.cap) / pixel + 2.0 * _HALF
-        return self.radii[samples, at[:, 0], at[:, 1]] > reach
+        return self.radii[samples, at[:, 0], at[:, 1]]
 
 
 class SkyMaps:
