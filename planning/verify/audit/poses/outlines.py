@@ -72,9 +72,8 @@ class Outlines:
 
     def above(self, point: Array, normal: Array, edges: Ints) -> Mask:
         """Return which edges have an end before the plane of a point, (k,)."""
-        height = (self.mesh.vertices - point) @ normal
-        begin, end = self.mesh.edges.ends[edges].T
-        above: Mask = (height[begin] > 0.0) | (height[end] > 0.0)
+        ends = self.mesh.vertices[self.mesh.edges.ends[edges]]
+        above: Mask = np.any((ends - point) @ normal > 0.0, axis=1)
         return above
 
     def arcs(self, point: Array, edges: Ints, step: float) -> Array:
