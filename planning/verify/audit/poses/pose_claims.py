@@ -155,7 +155,10 @@ def _derived(
 
 @dataclass(frozen=True, eq=False)
 class _Search:
-    """Asks about so many devices: without shadows first, which takes no maps."""
+    """Asks about so many devices: without shadows first, which takes no maps.
+
+    Multipliers that suffice look at fewest cells; pairs are looked at last.
+    """
 
     cells: DeviceCells
     multipliers: Ints
@@ -174,10 +177,11 @@ class _Search:
         for shadows in self.cells.stages:
             asked = self._question(self.wanted[paying], shadows=shadows)
             outcome = asked.by_multipliers(most, multipliers[paying])
-            if not outcome.too_few and n_devices == 2:
-                outcome = self._question(self.wanted, shadows=shadows).by_pairs(least)
             if outcome.too_few:
-                break
+                return outcome
+        if n_devices == 2:
+            asked = self._question(self.wanted, shadows=self.cells.stages[-1])
+            return asked.by_pairs(least)
         return outcome
 
     def _question(self, some: Ints, *, shadows: bool) -> Question:

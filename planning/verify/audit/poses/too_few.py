@@ -82,7 +82,7 @@ class Question:
             waiting = waiting.with_more(self._costly(halves, may, multipliers, most))
             looked_at += len(halves.low_m)
             self.tick(looked_at)
-        return Outcome(True, f"{looked_at} cells, each of multipliers up to {most}")
+        return Outcome(True, f"{looked_at} cells")
 
     def by_pairs(self, least: int) -> Outcome:
         """Split cells until no two, or one taken twice, may serve so many."""
