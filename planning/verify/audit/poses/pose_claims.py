@@ -141,7 +141,10 @@ def _derived(
     found = search.too_few(few, required)
     if not found.too_few:
         return found, True
-    words = f"no {few} anywhere cover {required} of {n_samples} samples ({found.how})"
+    more = f"{few} more" if given else str(few)
+    words = f"no {more} anywhere cover {required} of {n_samples} samples ({found.how})"
+    if few == 0:
+        words = f"{required} of {n_samples} samples are left to cover"
     found = Outcome(True, words)
     if table.one_fewer_upper_bound_m2 is None:
         return found, False

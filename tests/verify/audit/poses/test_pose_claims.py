@@ -16,6 +16,7 @@ from planning.verify.audit.audit_case import AuditCase, examine
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.poses.device_cells import device_cells, lit_by_plan
 from planning.verify.audit.poses.pose_claims import PoseBound, audit_pose_proofs
+from planning.verify.audit.predicates.predicates import LIT, light_steps
 from planning.verify.audit.proofs.frozen_samples import (
     covered_by_candidates,
     drawn_again,
@@ -126,6 +127,35 @@ def test_a_bound_raised_by_one_is_false(case) -> None:
     assert len(false) == 1
     assert "certificates.projectors.continuous.certificate" in false[0]
     assert "the certificate is of 2" in false[0]
+
+
+def test_what_existing_devices_cover_is_free(handmade, case) -> None:
+    pose = case.plan.projectors[0].world_from_device.tolist()
+
+    def stand(document: dict[str, Any]) -> None:
+        document["projectors"][0] |= {"existing": True, "name": "wall"}
+        one = {"name": "wall", "kind": "projector", "world_from_device": pose}
+        document["requirements"]["existing"] = [one]
+
+    proof = case.plan.proof.over_poses["projector"]
+    samples = drawn_again(case, proof.draws, proof.faces)
+    reached = covered_by_candidates(case, "projector", samples).any(axis=1)
+    limits = case.plan.requirements.projector
+    # Whatever its rings, of which some may be too narrow.
+    ringless = replace(case.projectors[0], radii=np.array([np.inf]))
+    free = reached & (light_steps(ringless, samples, limits, case.shadow) == LIT)
+    required = int(np.ceil(0.95 * reached.sum() - 1e-9)) - int(free.sum())
+    assert 0 < free.sum() < required + free.sum()
+    plan = with_file(
+        handmade.tampered(case.plan, stand), {"projector": replace(proof, n_devices=0)}
+    )
+    bounds, false = held(case, with_bound(plan, "projector", lower_bound=2))
+    assert "camera" in false[0]
+    words = f"{required} of {_N} samples are left to cover"
+    assert words in bounds["projector"].line
+    # It alone is in every plan.
+    bounds, _ = held(case, with_bound(plan, "projector", lower_bound=1))
+    assert bounds["projector"].line.endswith("proved: so many stand already")
 
 
 @pytest.mark.parametrize("kind", _KINDS)
