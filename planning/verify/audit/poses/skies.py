@@ -134,7 +134,6 @@ class SkyMaps:
             self._outlines,
             self._caster,
             samples.points[k],
-            int(samples.faces[k]),
             self._touching_m,
         )
         closed |= sky.blocked(self._frames[k], self._local, drawn, self._cap)
@@ -149,14 +148,13 @@ class _Sky:
     outlines: Outlines
     caster: RayCaster
     point: Array
-    face: int
     touching_m: float
 
     def blocked(self, frame: Array, local: Array, drawn: Mask, cap: float) -> Mask:
         """Return which pixels are blocked for sure; those of `drawn` are looked at."""
         sides = self.outlines.sides(self.point)
+        # Its own face is among those that touch it.
         others = np.ones(len(sides), dtype=bool)
-        others[self.face] = False
         others[self.outlines.touching(self.point, sides, self.touching_m)] = False
         mesh = self.caster.mesh
         away = np.linalg.norm(mesh.vertices - self.point, axis=1)
