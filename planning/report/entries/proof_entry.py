@@ -68,19 +68,17 @@ def with_proofs(
     for kind, (claims, frozen, covers, share, refutation) in stated.items():
         if claims is None or frozen is None or not claims.needed.lower_bound:
             continue
-        everywhere = claims.continuous
-        if everywhere is not None and refutation is not None:
-            over_poses[kind] = made = _over_poses(frozen, refutation)
-            if made.n_devices + 1 + claims.given >= everywhere.lower_bound:
-                everywhere = everywhere.changed(certificate="offered")
-                claims = claims.changed(continuous=everywhere)
-                changed[f"{kind}s"] = claims
+        bound, offered = claims.continuous, _over_poses(frozen, refutation)
+        if bound is not None and offered is not None:
+            over_poses[kind] = offered
+            bound = bound.changed(certificate="offered")
+            changed[f"{kind}s"] = claims = claims.changed(continuous=bound)
         proof = _proof(claims, frozen, covers, share)
         if proof is not None:
             proofs[kind] = proof
             if proof.n_sets + 1 >= claims.needed.lower_bound:
-                bound = claims.candidates.changed(status="proved")
-                changed[f"{kind}s"] = claims.changed(candidates=bound)
+                among = claims.candidates.changed(status="proved")
+                changed[f"{kind}s"] = claims.changed(candidates=among)
     if not changed:
         return certificates, None
     file = ProofFile.of(proofs, over_poses)
@@ -97,18 +95,24 @@ def _stand(partial: PartialPlan) -> bool:
     )
 
 
-def _over_poses(frozen: "_Frozen", refutation: Refutation) -> PoseProof:
-    """Return the certificate over all poses, of all samples up to its last one."""
-    draws, points, faces, where = frozen
-    n, rest = len(refutation.multipliers), where[len(refutation.multipliers) :]
-    every = np.zeros(rest[0] if len(rest) else len(points), dtype=np.int64)
-    every[where[:n]] = refutation.multipliers
-    return PoseProof(draws, faces, refutation.n_devices, every)
-
-
 _Ints = NDArray[np.int64]
 # Draws, points, faces, and the places of a cover's samples among them.
 _Frozen = tuple[_Ints, NDArray[np.float64], _Ints, _Ints]
+
+
+def _over_poses(frozen: _Frozen, refutation: Refutation | None) -> PoseProof | None:
+    """Return the certificate over all poses, of all samples up to its last one.
+
+    None where there is none, or of a cover of more samples.
+    """
+    draws, points, faces, where = frozen
+    if refutation is None or len(refutation.multipliers) > len(where):
+        return None
+    n = len(refutation.multipliers)
+    last = where[n] if n < len(where) else len(points)
+    every = np.zeros(last, dtype=np.int64)
+    every[where[:n]] = refutation.multipliers
+    return PoseProof(draws, faces, refutation.n_devices, every)
 
 
 def _projector_draws() -> Iterable[list[tuple[Draw, int]]]:

@@ -30,6 +30,8 @@ from .skies import Skies
 from .sphere_cells import Cells, seen_from
 
 _ROUNDING = 1e-9
+# The audit differentiates its projection by differences.
+_DIFFERENCES = 1e-6
 _RIGHT = 0.5 * np.pi
 
 
@@ -215,14 +217,16 @@ class MeasuredCells:
         held = crossing >= limits.min_conditioning - _ROUNDING
         shift = nearest * turned * self.lens.least_turn
         if limits.min_ring_pitch_px is not None:
-            held &= shift * limits.min_ring_pitch_px <= one.spacing_m * facing + 1e-15
+            least = shift * limits.min_ring_pitch_px * (1.0 - _DIFFERENCES)
+            held &= least <= one.spacing_m * facing
         if limits.max_sigma_m is not None:
             errors, by_ray = limits.calibration, 0.0
             if errors is not None and limits.accuracy_of == "total":
                 by_ray = (errors.angle**2 * nearest**2 + errors.position_m**2) / 3.0
             square = (one.noise_px * shift) ** 2 + by_ray * turned**2
             square = square + (one.placed_m * squarely) ** 2
-            held &= square <= (limits.max_sigma_m * crossing) ** 2 * (1.0 + _ROUNDING)
+            most = limits.max_sigma_m * crossing * (1.0 + _DIFFERENCES)
+            held &= square <= most**2
         return held
 
 
