@@ -1,7 +1,7 @@
 """Bounds over the candidates, derived again: what it takes, and whether others agree.
 
-Usage: python -m benchmarks.plans.proofs [--plans N] [--few] [--poses]   (ringrig
-    installed, from a checkout)
+Usage: python -m benchmarks.plans.proofs [--plans N] [--few] [--poses] [--only NAME ...]
+    (ringrig installed, from a checkout)
 
 Plans the sample, heads of `plan sample --variant`, and the shared meshes where they are
 present, in both lights, N plans in all (20); with --few, few candidates are offered.
@@ -68,6 +68,7 @@ def main() -> int:
     options.add_argument("--plans", type=int, default=20)
     options.add_argument("--few", action="store_true")
     options.add_argument("--poses", action="store_true")
+    options.add_argument("--only", nargs="+", metavar="NAME")
     given = options.parse_args()
     print(
         f"machine: {platform.processor() or platform.machine()}, {os.cpu_count()} "
@@ -80,7 +81,12 @@ def main() -> int:
         few = Path(folder, "few.toml") if given.few else None
         if few is not None:
             few.write_text(small_job.RIG)
-        for name, words, light in islice(_jobs(Path(folder)), given.plans):
+        jobs = (
+            job
+            for job in _jobs(Path(folder))
+            if given.only is None or job[0] in given.only
+        )
+        for name, words, light in islice(jobs, given.plans):
             out = Path(folder, "plan")
             command = [*_RUN, *words, *_OPTIONS, *_UNCHECKED, "--light", light]
             command += ["-o", str(out), *(["--rig", str(few)] if few else [])]
