@@ -1,7 +1,7 @@
 """Bounds over the candidates, derived again: what it takes, and whether others agree.
 
-Usage: python -m benchmarks.plans.proofs [--plans N] [--few]   (ringrig installed,
-    from a checkout)
+Usage: python -m benchmarks.plans.proofs [--plans N] [--few] [--poses] [--only NAME ...]
+    (ringrig installed, from a checkout)
 
 Plans the sample, heads of `plan sample --variant`, and the shared meshes where they are
 present, in both lights, N plans in all (20); with --few, few candidates are offered.
@@ -11,6 +11,9 @@ of the plan) and of the checker; whether the plan with the bound raised by one i
 refused; and what HiGHS (scipy.optimize.milp) and, where `ortools` is installed, CP-SAT
 find on the matrix of the checker with one device fewer, each in ten times what
 `solve_cover` takes on it.
+
+With --poses the bounds over all poses instead: processor seconds of the checker, what
+became of the bound, and of one raised by one with a file that says so.
 """
 
 import argparse
@@ -32,10 +35,12 @@ from planning.model.plan import RigPlan
 from planning.proofs.selection import cover_problem
 from planning.verify.audit.audit_case import AuditCase, DeviceKind, examine
 from planning.verify.audit.audit_findings import AuditFindings
-from planning.verify.audit.proofs.proof_claims import (
-    audit_proofs,
+from planning.verify.audit.poses.pose_claims import audit_pose_proofs
+from planning.verify.audit.proofs.frozen_samples import (
     covered_by_candidates,
+    drawn_again,
 )
+from planning.verify.audit.proofs.proof_claims import audit_proofs
 from solvers import solve_cover
 
 from .other_solvers import by_cp_sat, by_highs
@@ -49,6 +54,11 @@ _HEAD = (
     *("bytes", "finder [s]", "checker [s]", "raised by one", "required"),
     *("HiGHS, one fewer", "CP-SAT, one fewer"),
 )
+_HEAD_OF_POSES = (
+    *("mesh", "light", "devices", "at least", "status", "by", "finder [s]"),
+    *("checker [s]", "derived", "raised by one"),
+)
+_STAGES = {"projector": "bounds", "camera": "camera_bounds"}
 _LEAST_S = 2.0
 
 
@@ -57,15 +67,23 @@ def main() -> int:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--plans", type=int, default=20)
     options.add_argument("--few", action="store_true")
+    options.add_argument("--poses", action="store_true")
+    options.add_argument("--only", nargs="+", metavar="NAME")
     given = options.parse_args()
     print(f"{machine()}\n")
-    print(f"| {' | '.join(_HEAD)} |\n|{len(_HEAD) * '---|'}", flush=True)
+    head, rows = (_HEAD_OF_POSES, _pose_rows) if given.poses else (_HEAD, _rows)
+    print(f"| {' | '.join(head)} |\n|{len(head) * '---|'}", flush=True)
     wrong = 0
     with tempfile.TemporaryDirectory() as folder:
         few = Path(folder, "few.toml") if given.few else None
         if few is not None:
             few.write_text(small_job.RIG)
-        for name, words, light in islice(_jobs(Path(folder)), given.plans):
+        jobs = (
+            job
+            for job in _jobs(Path(folder))
+            if given.only is None or job[0] in given.only
+        )
+        for name, words, light in islice(jobs, given.plans):
             out = Path(folder, "plan")
             command = [*_RUN, *words, *_OPTIONS, *_UNCHECKED, "--light", light]
             command += ["-o", str(out), *(["--rig", str(few)] if few else [])]
@@ -74,7 +92,7 @@ def main() -> int:
                 last = done.stderr.strip().splitlines()[-1:]
                 print(f"| {name} | {light} | no plan: {' '.join(last)} |", flush=True)
                 continue
-            for row, holds in _rows(RigPlan.load(out / "plan.json")):
+            for row, holds in rows(RigPlan.load(out / "plan.json")):
                 print(f"| {name} | {light} | {' | '.join(row)} |", flush=True)
                 wrong += not holds
     return int(wrong > 0)
@@ -120,7 +138,8 @@ def _rows(plan: RigPlan) -> Iterator[tuple[list[str], bool]]:
             continue
         proof = plan.proof.proofs[kind.name]
         raised = _refused(case, kind)
-        covers = covered_by_candidates(case, kind.name, proof)
+        samples = drawn_again(case, proof.draws, proof.faces)
+        covers = covered_by_candidates(case, kind.name, samples)
         required = int(np.ceil(kind.share * int(covers.any(axis=1).sum()) - 1e-9))
         asked = covers, required, least - 1, _limit(covers, required)
         others = by_highs(*asked), by_cp_sat(*asked)
@@ -134,6 +153,60 @@ def _rows(plan: RigPlan) -> Iterator[tuple[list[str], bool]]:
             ],
             raised and not findings.failures and "SMALLER" not in " ".join(others),
         )
+
+
+def _pose_rows(plan: RigPlan) -> Iterator[tuple[list[str], bool]]:
+    """Yield the cells of each bound over all poses, and whether it does what it should.
+
+    None may be false, and none that was raised by one beyond what devices of the plan
+    refute may be derived.
+    """
+    case = examine(plan, seed=plan.document.seed, threads=1, n_samples=2000)
+    for kind in case.kinds:
+        table = kind.proof.continuous
+        if table is None:
+            continue
+        begun = time.process_time()
+        derived, false = _everywhere(_alone(case, kind))
+        took = time.process_time() - begun
+        raised, _ = _everywhere(_raised(case, kind))
+        enough = table.lower_bound == kind.proof.needed.count
+        yield (
+            [
+                *(f"{kind.proof.count} {kind.name}s", str(table.lower_bound)),
+                *(table.status, table.proof.replace("|", "/")),
+                f"{plan.document.timings_s.get(_STAGES[kind.name], 0.0):.1f}",
+                *(f"{took:.1f}", "FALSE" if false else derived),
+                raised,
+            ],
+            not false and not (enough and raised.startswith("proved")),
+        )
+
+
+def _everywhere(case: AuditCase) -> tuple[str, bool]:
+    """Say what became of the one bound over all poses, and whether it is false."""
+    findings = AuditFindings()
+    bounds = audit_pose_proofs(case, findings, lambda _: None)
+    words = [bound.line.split(" over all poses is ")[1] for bound in bounds]
+    short = [w if w.startswith("claimed") else w.split(",")[0] for w in words]
+    trusted = any(b.trusted for b in bounds) and short[0] == "proved"
+    area = " but for its area" if trusted else ""
+    return (short[0] + area if short else "FALSE"), bool(findings.failures)
+
+
+def _raised(case: AuditCase, kind: DeviceKind) -> AuditCase:
+    """The case with a bound, and its certificate, of one device more."""
+    claims, file = kind.proof, case.plan.proof
+    assert claims.continuous is not None
+    least = claims.continuous.lower_bound + 1
+    table = claims.continuous.changed(lower_bound=least)
+    over_poses = {} if file is None else dict(file.over_poses)
+    if kind.name in over_poses:
+        proof = over_poses[kind.name]
+        over_poses[kind.name] = replace(proof, n_devices=proof.n_devices + 1)
+    made = None if file is None else type(file).of(file.proofs, over_poses)
+    edited = replace(case, plan=replace(case.plan, proof=made))
+    return _alone(edited, replace(kind, proof=claims.changed(continuous=table)))
 
 
 def _alone(case: AuditCase, kind: DeviceKind) -> AuditCase:

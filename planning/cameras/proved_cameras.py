@@ -84,4 +84,5 @@ def bound_stage(
     lit = taken(samples, wanted, samples.lit)
     known = measured[wanted].T
     bound = bound_cameras(scene, devices, lit, question, effort, known)
-    return replace(stage, certificate=joined(proof, bound.proof()))
+    certificate, refutation = joined(proof, bound.proof()), bound.refutation()
+    return replace(stage, certificate=certificate, refutation=refutation)

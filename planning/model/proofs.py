@@ -1,7 +1,7 @@
-"""`proof.npz`: why fewer of the candidates are too few, for whoever asks.
+"""`proof.npz`: why fewer devices are too few, for whoever asks.
 
-Of each kind of device the frozen samples, and one certificate: the candidates are the
-reference poses of `surface.npz`.
+Of each kind of device the frozen samples, and a certificate over the candidates, which
+are the reference poses of `surface.npz`; and one over all poses.
 """
 
 import hashlib
@@ -23,9 +23,11 @@ from .errors import PlanFileError
 from .files import reading
 from .surface import DAMAGED
 
-# What all arrays of a kind may take, unpacked [bytes].
+KINDS = ("projector", "camera")
+# What all arrays may take, unpacked [bytes].
 _LARGEST = 1_000_000_000
-_FIELDS: dict[str, tuple[str, int]] = {
+_Fields = dict[str, tuple[str, int]]
+_OF_COVERS: _Fields = {
     "draws": ("i", 2),
     "points": ("f", 2),
     "faces": ("i", 1),
@@ -35,6 +37,12 @@ _FIELDS: dict[str, tuple[str, int]] = {
     "nodes": ("i", 1),
     "groups": ("i", 1),
     "group_ends": ("i", 1),
+}
+_OF_POSES: _Fields = {
+    "draws": ("i", 2),
+    "faces": ("i", 1),
+    "n_devices": ("i", 0),
+    "multipliers": ("i", 1),
 }
 
 
@@ -94,6 +102,35 @@ class CoverProof:
 
 
 @dataclass(frozen=True, eq=False)
+class PoseProof:
+    """That no `n_devices` at any poses cover as many of the samples as are required.
+
+    Attributes:
+        draws: Of the samples, as of `CoverProof`.
+        faces: Face of each sample, shape (n,).
+        n_devices: More of them, beside existing ones, are too few.
+        multipliers: Of the first samples, those that the bound speaks of, shape (k,).
+    """
+
+    draws: Ints
+    faces: Ints
+    n_devices: int
+    multipliers: Ints
+
+    def __post_init__(self) -> None:
+        whole = (
+            self.draws.shape[1:] == (3,)
+            and len(self.multipliers) <= len(self.faces)
+            and bool(np.all(self.multipliers >= 0))
+            # So that no sum of them overflows.
+            and sum(self.multipliers.tolist()) < 1 << 62
+            and self.n_devices >= 0
+        )
+        if not whole:
+            raise PlanFileError("its arrays don't fit each other")
+
+
+@dataclass(frozen=True, eq=False)
 class ProofFile:
     """What `proof.npz` holds, packed."""
 
@@ -105,13 +142,22 @@ class ProofFile:
         return hashlib.sha256(self.content).hexdigest()
 
     @classmethod
-    def of(cls, proofs: Mapping[str, CoverProof]) -> "ProofFile":
+    def of(
+        cls,
+        proofs: Mapping[str, CoverProof],
+        over_poses: Mapping[str, PoseProof] | None = None,
+    ) -> "ProofFile":
         """Pack the proofs of `projector` and `camera`, the same bytes for the same."""
         buffer = BytesIO()
         arrays: dict[str, Any] = {
             f"{kind}_{name}": getattr(proof, name)
             for kind, proof in proofs.items()
-            for name in _FIELDS
+            for name in _OF_COVERS
+        }
+        arrays |= {
+            f"{kind}_poses_{name}": getattr(proof, name)
+            for kind, proof in (over_poses or {}).items()
+            for name in _OF_POSES
         }
         np.savez_compressed(buffer, **arrays)
         return cls(buffer.getvalue())
@@ -133,38 +179,52 @@ class ProofFile:
                 f"come from one run"
             )
         try:
-            _ = proof.proofs
+            _ = proof.proofs, proof.over_poses
         except PlanFileError as error:
             raise PlanFileError(f"{path}: {error}; plan again") from None
         return proof
 
     @cached_property
     def proofs(self) -> dict[str, CoverProof]:
-        """The proof of each kind that has one.
+        """The proof over the candidates of each kind that has one.
 
         Raises:
             PlanFileError: If something is missing, or of another kind.
         """
+        kinds = [kind for kind in KINDS if f"{kind}_nodes" in self._arrays]
+        return {k: CoverProof(**_unpacked(k, _OF_COVERS, self._arrays)) for k in kinds}
+
+    @cached_property
+    def over_poses(self) -> dict[str, PoseProof]:
+        """The same over all poses."""
+        kinds = [k for k in KINDS if f"{k}_poses_multipliers" in self._arrays]
+        return {
+            k: PoseProof(**_unpacked(f"{k}_poses", _OF_POSES, self._arrays))
+            for k in kinds
+        }
+
+    @cached_property
+    def _arrays(self) -> dict[str, NDArray[Any]]:
         try:
             with ZipFile(BytesIO(self.content)) as archive:
                 size = sum(entry.file_size for entry in archive.infolist())
             if size > _LARGEST:
                 raise PlanFileError(f"it holds {size} bytes, at most {_LARGEST}")
             with np.load(BytesIO(self.content), allow_pickle=False) as archive:
-                found = {name: archive[name] for name in archive.files}
+                return {name: archive[name] for name in archive.files}
         except PlanFileError:
             raise
         except (OSError, ValueError, *DAMAGED) as error:
             raise PlanFileError(f"not a readable .npz ({error})") from None
-        kinds = [k for k in ("projector", "camera") if f"{k}_nodes" in found]
-        return {kind: _unpacked(kind, found) for kind in kinds}
 
 
-def _unpacked(kind: str, found: Mapping[str, NDArray[Any]]) -> CoverProof:
-    fields: dict[str, Any] = {}
-    for name, (numbers, ndim) in _FIELDS.items():
-        array = found.get(f"{kind}_{name}")
+def _unpacked(
+    of: str, fields: _Fields, found: Mapping[str, NDArray[Any]]
+) -> dict[str, Any]:
+    values: dict[str, Any] = {}
+    for name, (numbers, ndim) in fields.items():
+        array = found.get(f"{of}_{name}")
         if array is None or array.dtype.kind != numbers or array.ndim != ndim:
-            raise PlanFileError(f"`{kind}_{name}` is missing, or of another kind")
-        fields[name] = int(array) if ndim == 0 else array
-    return CoverProof(**fields)
+            raise PlanFileError(f"`{of}_{name}` is missing, or of another kind")
+        values[name] = int(array) if ndim == 0 else array
+    return values

@@ -46,7 +46,9 @@ def prove_fewest(
         bound = bound_of(scene, stage, templates, effort)
         better = _better(source, stage, bound, effort) if joining else stage
         if better is stage:
-            return replace(stage, certificate=joined(stage.certificate, bound.proof()))
+            certificate = joined(stage.certificate, bound.proof())
+            refutation = bound.refutation()
+            return replace(stage, certificate=certificate, refutation=refutation)
         stage = better
     n_reached = int(stage.candidates.reached.sum())
     return replace(stage, certificate=with_existing_alone(stage.certificate, n_reached))

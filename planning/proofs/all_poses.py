@@ -11,7 +11,7 @@ from solvers.cells.cell_bound import CellBound, CellStatus, bound_count
 from solvers.cells.cell_problem import CellProblem
 from solvers.cells.cell_tree import CellTree
 
-from .candidate_certificate import least_for_total
+from .candidate_certificate import Refutation, least_for_total
 from .quotas import Quotas, RegionFloors
 
 _STATUS: dict[CellStatus, Literal["proved", "survived", "cut"]] = {
@@ -70,6 +70,7 @@ class BoundQuestion:
         sample_area_m2: Area that each of them stands for.
         n_existing: Existing devices.
         n_free: Samples that these cover.
+        wanted: Which samples are neither free nor out of reach, (n_samples,).
     """
 
     required: int
@@ -80,6 +81,7 @@ class BoundQuestion:
     n_free: int = 0
     floors: tuple[int, ...] = ()
     regions: NDArray[np.int64] | None = None
+    wanted: NDArray[np.bool_] | None = None
 
     @classmethod
     def about(
@@ -107,6 +109,7 @@ class BoundQuestion:
             n_free,
             tuple(floors.tolist()),
             regions.row[reached & ~free],
+            reached & ~free,
         )
 
     def searched(
@@ -176,6 +179,23 @@ class ContinuousBound:
             n_cells=found.cells_used,
             one_fewer_upper_bound_m2=(most + question.n_free) * question.sample_area_m2,
         )
+
+    def refutation(self) -> Refutation | None:
+        """Return by what others may derive the bound again; None: by nothing.
+
+        Floors of regions aren't followed. Where multisets of cells were looked at, the
+        multipliers may yet prove as much over smaller cells.
+        """
+        found, wanted = self.found, self.question.wanted
+        if wanted is None or found.problem.required_total is not None:
+            return None
+        if not 1.0 <= found.lower_bound < np.inf:
+            return None
+        n_devices = int(found.lower_bound) - 1
+        multipliers = np.zeros(len(wanted), dtype=np.int64)
+        # Of one device, multipliers that are all alike look at all that it covers.
+        multipliers[wanted] = 1 if n_devices == 1 else found.multipliers
+        return Refutation(n_devices, multipliers)
 
 
 def with_existing_alone(certificate: Certificate, n_reached: int) -> Certificate:

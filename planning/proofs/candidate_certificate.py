@@ -1,7 +1,7 @@
 """The certificate of a cover over candidates, and of one device more."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -137,11 +137,30 @@ def _one_fewer(
 
 
 @dataclass(frozen=True, eq=False)
+class Refutation:
+    """That so many devices, beside existing ones, are too few wherever they stand.
+
+    Attributes:
+        n_devices: So many.
+        multipliers: Of the first samples of the cover, those of the bound, (n,).
+    """
+
+    n_devices: int
+    multipliers: NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
 class PlannedStage:
-    """What was proved of a kind of device, and the best found of each number."""
+    """What was proved of a kind of device, and the best found of each number.
+
+    Attributes:
+        refutation: Of what its bound over all poses follows; None: nothing that others
+            could follow.
+    """
 
     by_count: Mapping[int, tuple[Any, ...]]
     certificate: Certificate
+    refutation: Refutation | None = field(default=None, kw_only=True)
 
 
 _S = TypeVar("_S", bound=PlannedStage)

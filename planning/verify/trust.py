@@ -3,19 +3,22 @@
 Keys are dotted, `*` stands for any name or number; a key stands for all below it.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from geometry.mesh.mesh import TriangleMesh
 from planning.model.plan import RigPlan
+from planning.verify.audit.poses.pose_claims import PoseBound
 
 from .held_figures import EXACTLY, WHOLLY
 from .no_claims import is_under
 
+OVER_POSES = "bounds over all poses: not derived again, which --proofs does"
+
 # Claims that the audit holds against others, but doesn't recompute; by what they say.
 ON_TRUST = {
-    "bounds over all poses, and what other numbers of devices cover at most": (
-        "certificates.*.continuous",
+    OVER_POSES: ("certificates.*.continuous",),
+    "the numbers needed, and what other numbers of devices cover at most": (
         "certificates.*.needed",
         "certificates.*.by_count",
         "certificates.*.best_area",
@@ -69,6 +72,7 @@ def taken_on_trust(
     mesh: TriangleMesh | None,
     claims_held: str,
     figures_held: str,
+    over_poses: Sequence[PoseBound] | None = None,
 ) -> tuple[str, ...]:
     """Return what was believed of a plan, a line each; () where nothing was.
 
@@ -77,10 +81,11 @@ def taken_on_trust(
         mesh: What its surface was compared with; None: with nothing.
         claims_held: How closely its claims were held, "" where they weren't again.
         figures_held: The same of the figures of its check.
+        over_poses: What became of bounds over all poses; None: nothing was tried.
     """
     if claims_held == WHOLLY:
         return _digits(("figures of the check", figures_held))
-    lines = [*held_against_others(plan)]
+    lines = [*held_against_others(plan, over_poses)]
     for kind in ("projectors", "cameras"):
         proof = getattr(plan.document.certificates, kind)
         if proof is None or not proof.needed.lower_bound:
@@ -113,14 +118,17 @@ def taken_on_trust(
     return tuple(lines)
 
 
-def held_against_others(plan: RigPlan) -> tuple[str, ...]:
+def held_against_others(
+    plan: RigPlan, over_poses: Sequence[PoseBound] | None = None
+) -> tuple[str, ...]:
     """Return which claims of a plan the audit doesn't recompute, a line a kind."""
-    keys = list(_keys(plan.to_document()))
-    return tuple(
-        what
-        for what, patterns in ON_TRUST.items()
-        if any(is_under(key, dict.fromkeys(patterns, what)) for key in keys)
-    )
+    keys, lines = list(_keys(plan.to_document())), list[str]()
+    for what, patterns in ON_TRUST.items():
+        if what == OVER_POSES and over_poses is not None:
+            lines += [bound.trusted for bound in over_poses if bound.trusted]
+        elif any(is_under(key, dict.fromkeys(patterns, what)) for key in keys):
+            lines.append(what)
+    return tuple(lines)
 
 
 def _digits(*parts: tuple[str, str]) -> tuple[str, ...]:

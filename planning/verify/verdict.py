@@ -58,6 +58,10 @@ class Verification:
         """Recomputed areas of `surface` and `target`, keys as in the plan [m²]."""
         return self.audit.areas
 
+    @property
+    def _over_poses(self) -> list[str]:
+        return [bound.line for bound in self.audit.over_poses or ()]
+
     def to_document(self) -> dict[str, Any]:
         """Return plain JSON values."""
         pixels = self.reconstruction
@@ -72,7 +76,7 @@ class Verification:
             "compared": self.compared,
             "claims_held": self.claims_held,
             "taken_on_trust": list(self.trusted),
-            "proofs": list(self.audit.proofs),
+            "proofs": [*self.audit.proofs, *self._over_poses],
             **({"members": named} if named else {}),
         }
 
@@ -97,7 +101,7 @@ class Verification:
         bounced = self.reconstruction and self.reconstruction.record().interreflection
         if bounced and bounced.warning():
             lines.append(f"warning: {bounced.warning()}")
-        lines += self.audit.proofs
+        lines += (*self.audit.proofs, *self._over_poses)
         lines += [f"taken on trust: {sentence}" for sentence in self.trusted]
         lines += [f"not met: {sentence}" for sentence in self.unmet]
         lines += [f"FALSE: {sentence}" for sentence in self.failures]

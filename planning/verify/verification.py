@@ -53,6 +53,7 @@ def verify_plan(
     progress: Callable[[str], None] | None = None,
     again: Again | None = None,
     proofs: bool = True,
+    over_poses: bool = False,
 ) -> Verification:
     """Recompute every claim of a plan, then measure its object through pixels.
 
@@ -74,6 +75,7 @@ def verify_plan(
             they are held to the last digit where nothing of what made the plan is
             different; None: they are held by the audit alone.
         proofs: Whether bounds over candidates are derived again.
+        over_poses: Whether those over all poses are, which may take minutes.
 
     Raises:
         InputError: If `truth` can't be rendered for the plan.
@@ -100,6 +102,7 @@ def verify_plan(
             threads=threads,
             again=again,
             proofs=proofs,
+            over_poses=over_poses,
         )
     if truth is not None and truth.cameras_alone != plan.cameras_alone:
         raise InputError(
@@ -121,7 +124,8 @@ def verify_plan(
     pixels = None
     # Pixels need what was recomputed, and no claim.
     with abandonable(1) as pool:
-        auditing = pool.submit(audited, case, proofs=proofs)
+        told = say if over_poses else None
+        auditing = pool.submit(audited, case, proofs=proofs, over_poses=told)
         try:
             if check_pixels:
                 pixels = _reconstruct(plan, case, truth, other, seed, threads, say, how)
@@ -155,7 +159,7 @@ def verify_plan(
         missed,
         claims_held=claims_held,
         compared=figures_held,
-        trusted=taken_on_trust(plan, mesh, claims_held, figures_held),
+        trusted=taken_on_trust(plan, mesh, claims_held, figures_held, audit.over_poses),
     )
 
 
@@ -174,7 +178,9 @@ def _verify_family(
     held = ""
     if not false and all(one.passed for _, one in found):
         false, held = hold_claims(plan, how["again"], how["threads"] or n_threads())
-    believed = () if held == WHOLLY else held_against_others(plan)
+    # Members tell what became of their own bounds over all poses.
+    told = () if how["over_poses"] else None
+    believed = () if held == WHOLLY else held_against_others(plan, told)
     # Of one that needn't be served what it misses is no requirement; a lie is a lie.
     served = [one for m, one in enumerate(found) if m not in family.left_out]
     worst = found[min(family.worst, len(found) - 1)][1]

@@ -16,7 +16,7 @@ from planning.model.plan import RigPlan
 from planning.report.made_again import again_or_why_not
 from planning.verify.held_figures import EXACTLY
 from planning.verify.no_claims import is_under
-from planning.verify.trust import is_trusted
+from planning.verify.trust import OVER_POSES, is_trusted
 from planning.verify.verification import verify_plan
 
 
@@ -214,6 +214,33 @@ def test_what_is_taken_on_trust_is_told_and_strict_refuses_it(folder, monkeypatc
     assert told["passed"] is True
     assert told["claims_held"] == EXACTLY
     assert not any("--mesh" in line for line in told["taken_on_trust"])
+
+
+def test_proofs_derives_bounds_over_all_poses_and_refuses_higher_ones(plan):
+    honest = found(plan, again=None, over_poses=True)
+    assert honest.failures == ()
+    told = honest.summary()
+    for name in ("projectors", "cameras"):
+        bound = getattr(plan.document.certificates, name).continuous
+        words = f"{name}: at least {bound.lower_bound} over all poses is proved"
+        assert words in told
+    assert OVER_POSES not in honest.trusted
+    assert not any("over all poses" in line for line in honest.trusted)
+    without = found(plan, again=None)
+    assert OVER_POSES in without.trusted
+    assert "derived again" in without.summary()
+    assert "over all poses is" not in without.summary()
+
+    def one_more(document):
+        document["certificates"]["projectors"]["continuous"]["lower_bound"] += 1
+
+    edited = replace(forged(plan, one_more), proof=plan.proof)
+    (failure,) = (
+        line
+        for line in found(edited, again=None, over_poses=True).failures
+        if "continuous.certificate" in line
+    )
+    assert "the certificate is of" in failure
 
 
 def test_strict_holds_where_nothing_is_believed(plan):

@@ -50,6 +50,7 @@ def verify_command(options: Mapping[str, Any]) -> int:
             threads=threads,
             progress=report,
             again=again,
+            over_poses=options["proofs"],
         )
     if options["as_json"]:
         print_json(verification.to_document())

@@ -67,6 +67,11 @@ _SECTIONS = {
     metavar="NAME|FILE",
     help="With --replan, the rig in place of the command's.",
 )
+@click.option(
+    "--proofs",
+    is_flag=True,
+    help="Derive the bounds over all poses again, too, which may take minutes.",
+)
 @rendering_options
 @threads_option
 @output_options

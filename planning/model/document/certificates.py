@@ -37,6 +37,8 @@ class ContinuousProof(Part):
         n_reached: Those of them that some candidate covers.
         one_fewer_upper_bound_m2: Most area that one device fewer covers, from any
             poses; None: not known.
+        certificate: `offered` where `proof.npz` has multipliers by which others may
+            derive the bound again; else `none`.
     """
 
     lower_bound: Count
@@ -47,6 +49,7 @@ class ContinuousProof(Part):
     n_reached: Count
     n_cells: Count
     one_fewer_upper_bound_m2: float | None
+    certificate: Literal["offered", "none"] = "none"
 
 
 class NeededCount(Part):

@@ -1,4 +1,4 @@
-"""What travels with a plan so that others can derive its bounds over candidates."""
+"""What travels with a plan so that others can derive its bounds."""
 
 from collections.abc import Iterable
 
@@ -10,7 +10,8 @@ from planning.model.document.certificates import (
     Certificates,
     ProofRecord,
 )
-from planning.model.proofs import CoverProof, ProofFile
+from planning.model.proofs import CoverProof, PoseProof, ProofFile
+from planning.proofs.candidate_certificate import Refutation
 from planning.proofs.quotas import required_samples
 from planning.proofs.selection import cover_problem
 from planning.report.partial_plan import PartialPlan
@@ -51,28 +52,36 @@ def with_proofs(
             _frozen(scene, candidates.samples, _projector_draws()),
             candidates.lit,
             limits.dominant_coverage,
+            partial.stage.refutation,
         ),
         "camera": (
             certificates.cameras,
             _frozen(scene, target, _camera_draws()) if _stand(partial) else None,
             cover.measured,
             limits.coverage,
+            partial.camera_stage.refutation,
         ),
     }
     proofs: dict[str, CoverProof] = {}
+    over_poses: dict[str, PoseProof] = {}
     changed: dict[str, Certificate] = {}
-    for kind, (claims, frozen, covers, share) in stated.items():
+    for kind, (claims, frozen, covers, share, refutation) in stated.items():
         if claims is None or frozen is None or not claims.needed.lower_bound:
             continue
+        bound, offered = claims.continuous, _over_poses(frozen, refutation)
+        if bound is not None and offered is not None:
+            over_poses[kind] = offered
+            bound = bound.changed(certificate="offered")
+            changed[f"{kind}s"] = claims = claims.changed(continuous=bound)
         proof = _proof(claims, frozen, covers, share)
         if proof is not None:
             proofs[kind] = proof
             if proof.n_sets + 1 >= claims.needed.lower_bound:
-                bound = claims.candidates.changed(status="proved")
-                changed[f"{kind}s"] = claims.changed(candidates=bound)
+                among = claims.candidates.changed(status="proved")
+                changed[f"{kind}s"] = claims.changed(candidates=among)
     if not changed:
         return certificates, None
-    file = ProofFile.of(proofs)
+    file = ProofFile.of(proofs, over_poses)
     record = ProofRecord(path="proof.npz", sha256=file.sha256)
     return certificates.changed(**changed, proof=record), file
 
@@ -89,6 +98,21 @@ def _stand(partial: PartialPlan) -> bool:
 _Ints = NDArray[np.int64]
 # Draws, points, faces, and the places of a cover's samples among them.
 _Frozen = tuple[_Ints, NDArray[np.float64], _Ints, _Ints]
+
+
+def _over_poses(frozen: _Frozen, refutation: Refutation | None) -> PoseProof | None:
+    """Return the certificate over all poses, of all samples up to its last one.
+
+    None where there is none, or of a cover of more samples.
+    """
+    draws, points, faces, where = frozen
+    if refutation is None or len(refutation.multipliers) > len(where):
+        return None
+    n = len(refutation.multipliers)
+    last = where[n] if n < len(where) else len(points)
+    every = np.zeros(last, dtype=np.int64)
+    every[where[:n]] = refutation.multipliers
+    return PoseProof(draws, faces, refutation.n_devices, every)
 
 
 def _projector_draws() -> Iterable[list[tuple[Draw, int]]]:

@@ -1,5 +1,6 @@
 """The audit of a whole plan: every claim against a recomputation."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -46,6 +47,7 @@ from planning.verify.audit.devices.stock_claims import audit_stock
 from planning.verify.audit.devices.view_claims import audit_views
 from planning.verify.audit.devices.workspace_claims import audit_workspace
 from planning.verify.audit.devices.zone_claims import audit_zones
+from planning.verify.audit.poses.pose_claims import PoseBound, audit_pose_proofs
 from planning.verify.audit.proofs.proof_claims import audit_proofs
 from planning.verify.audit.rings.axis_claims import audit_ring_axes
 from planning.verify.audit.rings.ring_claims import audit_rings
@@ -134,12 +136,14 @@ class Audit:
             misses. That is no false claim.
         case: What was recomputed.
         proofs: Of each bound over candidates, whether it was derived again.
+        over_poses: What became of bounds over all poses; None: none was tried.
     """
 
     failures: tuple[str, ...]
     unmet: tuple[str, ...]
     case: AuditCase
     proofs: tuple[str, ...] = ()
+    over_poses: tuple[PoseBound, ...] | None = None
 
     @cached_property
     def areas(self) -> dict[str, dict[str, float]]:
@@ -166,10 +170,16 @@ def audit_plan(
     return audited(examine(plan, seed=seed, n_samples=n_samples, threads=threads))
 
 
-def audited(case: AuditCase, *, proofs: bool = True) -> Audit:
+def audited(
+    case: AuditCase,
+    *,
+    proofs: bool = True,
+    over_poses: Callable[[str], None] | None = None,
+) -> Audit:
     """Hold every claim of a plan against what was recomputed of it.
 
-    Without `proofs`, bounds over candidates aren't derived again.
+    Without `proofs`, bounds over candidates aren't derived again; those over all poses
+    are if `over_poses` receives a line now and then.
 
     Raises:
         PlanFileError: If the plan is broken, so that its claims have no meaning.
@@ -179,7 +189,11 @@ def audited(case: AuditCase, *, proofs: bool = True) -> Audit:
     for audit_claims in _CLAIMS_OF_VIEWS if alone else _CLAIMS:
         audit_claims(case, findings)
     derived = audit_proofs(case, findings) if proofs else ()
-    return Audit(findings.failures, _unmet_requirements(plan), case, derived)
+    everywhere = None
+    if over_poses is not None:
+        everywhere = audit_pose_proofs(case, findings, over_poses)
+    unmet = _unmet_requirements(plan)
+    return Audit(findings.failures, unmet, case, derived, everywhere)
 
 
 def first_false(case: AuditCase, *, quick: bool = False) -> tuple[str, ...]:

@@ -15,10 +15,11 @@ from planning.model.proofs import CoverProof, ProofFile
 from planning.report.summary.proof_lines import proof_lines
 from planning.verify.audit.audit_case import AuditCase, examine
 from planning.verify.audit.audit_findings import AuditFindings
-from planning.verify.audit.proofs.proof_claims import (
-    audit_proofs,
+from planning.verify.audit.proofs.frozen_samples import (
     covered_by_candidates,
+    drawn_again,
 )
+from planning.verify.audit.proofs.proof_claims import audit_proofs
 
 _KINDS = ("projector", "camera")
 
@@ -32,7 +33,8 @@ def case(handmade, request) -> AuditCase:
     for kind in case.kinds:
         stream = 100 if kind.name == "projector" else 200
         drawn = _drawn(plan, 300, stream)
-        covers = covered_by_candidates(case, kind.name, drawn)
+        samples = drawn_again(case, drawn.draws, drawn.faces)
+        covers = covered_by_candidates(case, kind.name, samples)
         required = int(np.ceil(kind.share * covers.any(axis=1).sum() - 1e-9))
         fewest = next(n for n in range(20) if not certificate(covers, n, required))
         made = certificate(covers, fewest - 1, required)

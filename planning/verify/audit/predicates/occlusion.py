@@ -209,6 +209,9 @@ class Shadow:
         mesh: The occluder.
         threads: Worker threads of the ray caster.
         obstacles: In the way of every device, or of those of a station.
+
+    Attributes:
+        slack_m: Nearer to a sample nothing blocks.
     """
 
     def __init__(
@@ -218,7 +221,7 @@ class Shadow:
         self.caster = RayCaster(mesh, threads=threads)
         self._centre = mesh.centre
         self._radius = 1.05 * mesh.reach
-        self._slack = _SLACK * mesh.radius
+        self.slack_m = _SLACK * mesh.radius
 
     @classmethod
     def of(cls, plan: RigPlan, *, threads: int) -> Self:
@@ -242,4 +245,4 @@ class Shadow:
         inside = self._radius**2 - np.einsum("ij,ij->i", offset, offset)
         back = np.minimum(lengths, b + np.sqrt(b * b + inside))
         hit, distance = self.caster.first_hits(points - back[:, None] * along, along)
-        return (hit == faces) | (distance >= back - self._slack)
+        return (hit == faces) | (distance >= back - self.slack_m)

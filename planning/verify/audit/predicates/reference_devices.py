@@ -14,7 +14,7 @@ def reference_projectors(plan: RigPlan) -> tuple[AuditProjector, ...]:
     if not plan.projectors:
         return ()
     last = np.array([plan.requirements.workspace.reference_ring_radius])
-    devices, surface = _optics(plan, "projector"), plan.surface
+    devices, surface = optics_of(plan, "projector"), plan.surface
     poses = zip(
         surface.reference_projectors,
         surface.reference_rings,
@@ -45,7 +45,7 @@ def _stations(plan: RigPlan, n_devices: int) -> list[str]:
     return [f"reference {k * heads // n_devices}" for k in range(n_devices)]
 
 
-def _optics(plan: RigPlan, kind: str) -> list[PinholeModel | ParallelModel]:
+def optics_of(plan: RigPlan, kind: str) -> list[PinholeModel | ParallelModel]:
     """Return the optics of each model of a kind."""
     models, devices = plan.document.rig.models(kind), getattr(plan, f"{kind}s")
     # Of one, the plan's own device: its model is audited against it.
@@ -56,7 +56,7 @@ def reference_cameras(plan: RigPlan) -> tuple[AuditCamera, ...]:
     """Return the reference cameras: each pose with the optics of its model."""
     if not plan.cameras:
         return ()
-    devices, surface = _optics(plan, "camera"), plan.surface
+    devices, surface = optics_of(plan, "camera"), plan.surface
     poses = zip(surface.reference_cameras, surface.models_of("camera"), strict=True)
     stations = _stations(plan, len(surface.reference_cameras))
     return tuple(

@@ -1,0 +1,84 @@
+"""The samples of a proof, drawn again, and what candidates cover of them."""
+
+import numpy as np
+
+from geometry.arrays import Array, Ints, Mask
+from geometry.mesh.sampling import sample_surface
+from geometry.parallel import mapped
+from planning.verify.audit.audit_case import AuditCase
+from planning.verify.audit.audit_samples import AuditSamples, samples_on
+from planning.verify.audit.predicates.audit_devices import AuditCamera
+from planning.verify.audit.predicates.predicates import LIT, MEASURED, light_steps
+from planning.verify.audit.predicates.recompute import light_of_plan, pairs_with
+from planning.verify.audit.predicates.reference_devices import (
+    reference_cameras,
+    reference_projectors,
+)
+
+from .refutation import RefutedProofError
+
+# Of the size of the mesh: how far a sample may lie from where it is drawn again.
+_NEAR = 1e-9
+# Draws of one proof, and samples of all: more is no file of ours.
+_MOST_DRAWS, _MOST_SAMPLES = 16, 100_000
+
+
+def covered_by_candidates(case: AuditCase, kind: str, samples: AuditSamples) -> Mask:
+    """Return which sample each reference pose lights, or measures, (n, m)."""
+    plan, threads = case.plan, case.shadow.caster.threads
+    limits, columns = plan.requirements, list[Mask]()
+    if kind == "projector":
+        devices = reference_projectors(plan)
+        columns = mapped(
+            lambda d: light_steps(d, samples, limits.projector, case.shadow) == LIT,
+            devices,
+            threads,
+        )
+        return np.stack(columns, axis=1)
+    light, _ = light_of_plan(plan, samples, case.shadow)
+    lit = np.flatnonzero((light == LIT).any(axis=0))
+    some, lit_by = samples.take(lit), light[:, lit] == LIT
+
+    def measured(camera: AuditCamera) -> Mask:
+        steps = pairs_with(camera, case.projectors, some, lit_by, limits, case.shadow)
+        return np.any(steps == MEASURED, axis=0)
+
+    columns = mapped(measured, reference_cameras(plan), threads)
+    covers = np.zeros((len(samples), len(columns)), dtype=bool)
+    covers[lit] = np.stack(columns, axis=1)
+    return covers
+
+
+def drawn_again(
+    case: AuditCase, draws: Ints, faces: Ints, points: Array | None = None
+) -> AuditSamples:
+    """Return the samples that draws give, as `CoverProof` has them.
+
+    Raises:
+        RefutedProofError: If they don't lie on these faces, or at these points.
+    """
+    plan, surface = case.plan, case.plan.surface
+    within = surface.target_faces(plan.requirements.target)
+    places, owners = list[Array](), list[Ints]()
+    counts = draws[:, 0]
+    if not (
+        1 <= len(counts) <= _MOST_DRAWS
+        and np.all((counts >= 1) & (counts <= _MOST_SAMPLES))
+        and counts.sum() <= _MOST_SAMPLES
+        and np.all(draws[:, 1:] >= 0)
+        and np.all(draws[:, 2] >= 1)
+        and len(np.unique(draws[:, 1])) == len(counts)
+    ):
+        raise RefutedProofError("its draws can't be made again")
+    for count, stream, every in draws.tolist():
+        mixed = np.random.SeedSequence([plan.document.seed, stream])
+        seed = int(mixed.generate_state(1)[0])
+        drawn = sample_surface(surface.mesh, count, seed=seed, within=within)
+        places.append(drawn.points[::every])
+        owners.append(drawn.faces[::every])
+    at, of = np.concatenate(places), np.concatenate(owners)
+    near = _NEAR * float(np.ptp(surface.mesh.bounds, axis=0).max())
+    same = points is None or bool(np.all(np.abs(at - points) <= near))
+    if not (np.array_equal(of, faces) and same):
+        raise RefutedProofError("its samples aren't those that its draws give")
+    return samples_on(surface, at, of, np.ones(len(of), dtype=bool))
