@@ -158,7 +158,10 @@ def _load(name: str) -> ModuleType:
 
 @pytest.fixture(scope="session")
 def with_little_work() -> Callable[..., AbstractContextManager[None]]:
-    """Few samples behind claims and confirmations, few poses, rough bounds."""
+    """Few samples behind claims and confirmations, few poses, rough bounds.
+
+    Other patches go inside: undone after it, they would bring its own back.
+    """
 
     @contextmanager
     def little(*, every_pose: bool = False) -> Generator[None]:

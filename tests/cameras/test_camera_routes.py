@@ -324,7 +324,7 @@ def planned(small_job, tmp_path_factory, with_little_work):
     (folder / "block.obj").write_text("\n".join(lines))
     words = ["--cameras-by", "paper", "--max-projectors", "2", "--target", "surface"]
     words += ["--dominant-coverage", "0.6"]
-    with pytest.MonkeyPatch.context() as patch, with_little_work():
+    with with_little_work(), pytest.MonkeyPatch.context() as patch:
         # What is proved of the projectors isn't the question.
         weak = Effort(finest=3, budget=1e6, shadows=0.0, most_samples=200)
         patch.setattr("planning.proofs.projector_bound.DEFAULT", weak)

@@ -444,7 +444,7 @@ def test_the_real_face_scan_is_planned(tmp_path):
     if not mesh.exists():
         pytest.skip("../shared/data isn't there")
     words = ["--mesh", str(mesh), "--max-projectors", "3"]
-    done = run(*words, "-o", str(tmp_path), "--quiet", cwd=tmp_path)
+    done = run(*words, "-o", str(tmp_path), "--quiet", cwd=tmp_path, before=LITTLE)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "CHECK    passed" in done.stdout
 

@@ -22,7 +22,7 @@ _BODY = {"size_mm": [420.0, 100.0, 80.0], "centre_mm": [0.0, 0.0, -30.0]}
 @pytest.fixture(scope="module")
 def few(with_little_work):
     """Few candidates, and little work on the rest."""
-    with pytest.MonkeyPatch.context() as patch, with_little_work():
+    with with_little_work(), pytest.MonkeyPatch.context() as patch:
         patch.setattr(Rig, "n_projector_poses", 40)
         patch.setitem(vars(DRAWS), "cameras", replace(DRAWS.cameras, count=600))
         yield

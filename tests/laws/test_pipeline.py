@@ -41,7 +41,7 @@ def plan(request, head, tmp_path_factory, with_little_work):
     """
     if request.param == "parallel":
         rig = load_rig("default", light="parallel")
-        with with_little_work(every_pose=True):
+        with with_little_work():
             return plan_rig(head, rig, max_projectors=4)
     (code,) = re.findall(r"```python\n(.*?)```", README.read_text("utf-8"), re.S)
     folder = tmp_path_factory.mktemp("readme")
@@ -169,7 +169,11 @@ def test_areas_are_nested_and_causes_add_up(plan):
 
 def test_counts_bounds_and_candidates_are_stated(plan):
     proofs = plan.to_document()["certificates"]
-    for kind, least in (("projectors", 600), ("cameras", 400)):
+    # The README's plan is offered as many as any; that in parallel light fewer.
+    whole = plan.projectors[0].light == "diverging"
+    for kind, least in zip(
+        ("projectors", "cameras"), (600, 400) if whole else (160, 120), strict=True
+    ):
         proof = proofs[kind]
         assert proof["count"] == len(plan.to_document()[kind])
         assert 1 <= proof["candidates"]["lower_bound"] <= proof["count"]

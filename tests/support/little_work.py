@@ -10,6 +10,7 @@ from planning.projectors import share_margin
 from planning.proofs import camera_bound, marginals, projector_bound
 from planning.rig.rig import Rig
 from planning.scene.draws import DRAWS
+from planning.verify.audit.audit_case import examine
 
 # Of the work on bounds over all poses, which most plans spend most of their time on.
 _SHARE = 0.1
@@ -23,6 +24,8 @@ _FEW = {
     "baselines": 2000,
     "confirming_baselines": 4000,
 }
+# Fresh samples that an audit looks at where its caller doesn't say how many.
+_AUDITED = 4000
 # Poses offered: a rig file can ask for no fewer than 600 and 400.
 _POSES = {"n_projector_poses": 160, "n_camera_poses": 120}
 # Samples that devices and rings are fitted to, and that confirm them, where a plan is
@@ -52,13 +55,14 @@ def found_path():
 
 
 def work_little(patch, *, every_pose=False):
-    """Let claims and confirmations rest on few samples; let bounds cost little.
+    """Let claims, confirmations and audits rest on few samples, bounds cost little.
 
     And few poses be offered, unless `every_pose`.
     """
     draw_fewer(patch, **_FEW)
     bound_roughly(patch)
     search_briefly(patch)
+    patch.setitem(examine.__kwdefaults__, "n_samples", _AUDITED)
     if not every_pose:
         offer_fewer(patch)
 
@@ -79,7 +83,7 @@ def draw_fewer(patch, **counts):
 def offer_fewer(patch):
     """Let fewer poses be offered than a rig file can ask for, until it is undone."""
     for name, count in _POSES.items():
-        patch.setattr(Rig, name, property(lambda _, count=count: count))
+        patch.setattr(Rig, name, count)
 
 
 def bound_roughly(patch):

@@ -42,7 +42,7 @@ _LEVEL = {
 @pytest.fixture(scope="module")
 def few(with_little_work):
     """Few circles and samples."""
-    with pytest.MonkeyPatch.context() as patch, with_little_work():
+    with with_little_work(), pytest.MonkeyPatch.context() as patch:
         patch.setattr(table_lattice, "_CIRCLES", 3)
         patch.setitem(vars(DRAWS), "cameras", replace(DRAWS.cameras, count=500))
         yield

@@ -54,7 +54,7 @@ _BODY = {"size_mm": [80.0, 60.0, 120.0], "centre_mm": [0.0, 0.0, -40.0]}
 @pytest.fixture(scope="module")
 def few(with_little_work):
     """Few circles and samples."""
-    with pytest.MonkeyPatch.context() as patch, with_little_work():
+    with with_little_work(), pytest.MonkeyPatch.context() as patch:
         patch.setattr(table_lattice, "_CIRCLES", 3)
         patch.setitem(vars(DRAWS), "cameras", replace(DRAWS.cameras, count=500))
         yield

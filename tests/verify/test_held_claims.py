@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 from click.testing import CliRunner
+from support.little_work import work_least
 from support.small_job import run
 
 from planning.cli.main import commands
@@ -21,9 +22,10 @@ from planning.verify.verification import verify_plan
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _few(with_little_work):
+def _few():
     """Whatever claims rest on, they come out again of as many."""
-    with with_little_work():
+    with pytest.MonkeyPatch.context() as patch:
+        work_least(patch)
         yield
 
 
