@@ -35,11 +35,11 @@ from planning.model.plan import RigPlan
 from planning.proofs.selection import cover_problem
 from planning.verify.audit.audit_case import AuditCase, DeviceKind, examine
 from planning.verify.audit.audit_findings import AuditFindings
-from planning.verify.audit.poses.pose_claims import audit_pose_proofs
 from planning.verify.audit.proofs.frozen_samples import (
     covered_by_candidates,
     drawn_again,
 )
+from planning.verify.audit.proofs.poses.pose_claims import audit_pose_proofs
 from planning.verify.audit.proofs.proof_claims import audit_proofs
 from solvers import solve_cover
 

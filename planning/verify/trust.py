@@ -8,7 +8,7 @@ from typing import Any
 
 from geometry.mesh.mesh import TriangleMesh
 from planning.model.plan import RigPlan
-from planning.verify.audit.poses.pose_claims import PoseBound
+from planning.verify.audit.proofs.poses.pose_claims import PoseBound
 
 from .held_figures import EXACTLY, WHOLLY
 from .no_claims import is_under

@@ -47,7 +47,7 @@ from planning.verify.audit.devices.stock_claims import audit_stock
 from planning.verify.audit.devices.view_claims import audit_views
 from planning.verify.audit.devices.workspace_claims import audit_workspace
 from planning.verify.audit.devices.zone_claims import audit_zones
-from planning.verify.audit.poses.pose_claims import PoseBound, audit_pose_proofs
+from planning.verify.audit.proofs.poses.pose_claims import PoseBound, audit_pose_proofs
 from planning.verify.audit.proofs.proof_claims import audit_proofs
 from planning.verify.audit.rings.axis_claims import audit_ring_axes
 from planning.verify.audit.rings.ring_claims import audit_rings

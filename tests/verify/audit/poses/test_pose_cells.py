@@ -20,10 +20,6 @@ from geometry.shapes.sample_head.sample_head import sample_head
 from planning.model.calibration_errors import CalibrationErrors
 from planning.model.requirements import ProjectorLimits, Workspace
 from planning.verify.audit.audit_samples import AuditSamples, samples_on
-from planning.verify.audit.poses.lit_cells import LitCells
-from planning.verify.audit.poses.measured_cells import Lens, LitBy, MeasuredCells
-from planning.verify.audit.poses.skies import Skies, SkyMaps
-from planning.verify.audit.poses.sphere_cells import Cells
 from planning.verify.audit.predicates.audit_devices import (
     AuditCamera,
     AuditProjector,
@@ -38,6 +34,10 @@ from planning.verify.audit.predicates.predicates import (
     pair_figures,
 )
 from planning.verify.audit.predicates.recompute import pairs_with
+from planning.verify.audit.proofs.poses.lit_cells import LitCells
+from planning.verify.audit.proofs.poses.measured_cells import Lens, LitBy, MeasuredCells
+from planning.verify.audit.proofs.poses.skies import Skies, SkyMaps
+from planning.verify.audit.proofs.poses.sphere_cells import Cells
 
 _LIMITS = ProjectorLimits(np.radians(65.0), np.radians(30.0))
 _DEEPEST = 26

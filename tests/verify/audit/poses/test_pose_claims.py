@@ -11,16 +11,15 @@ from planning.model.document.certificates import ContinuousProof, ProofRecord
 from planning.model.errors import PlanFileError
 from planning.model.plan import RigPlan
 from planning.model.proofs import PoseProof, ProofFile
-from planning.model.requirements import Requirements
 from planning.verify.audit.audit_case import AuditCase, examine
 from planning.verify.audit.audit_findings import AuditFindings
-from planning.verify.audit.poses.device_cells import device_cells, lit_by_plan
-from planning.verify.audit.poses.pose_claims import PoseBound, audit_pose_proofs
 from planning.verify.audit.predicates.predicates import LIT, light_steps
 from planning.verify.audit.proofs.frozen_samples import (
     covered_by_candidates,
     drawn_again,
 )
+from planning.verify.audit.proofs.poses.device_cells import device_cells, lit_by_plan
+from planning.verify.audit.proofs.poses.pose_claims import PoseBound, audit_pose_proofs
 from planning.verify.trust import OVER_POSES, taken_on_trust
 
 _KINDS = ("projector", "camera")
@@ -255,27 +254,19 @@ def test_numbers_that_sum_to_nothing_sensible_are_refused(case, changes) -> None
         replace(case.plan.proof.over_poses["projector"], **changes)
 
 
-def test_shadows_count_only_where_all_devices_stand_outside(case) -> None:
-    samples = case.samples.take(np.arange(20))
-    every, space = np.ones((1, 20), dtype=bool), case.plan.requirements.workspace
-    stages = device_cells(case, "projector", samples, every, shadows=True).stages
-    assert stages == (False, True)
-    assert device_cells(case, "projector", samples, every, shadows=False).stages == (
+def test_shadows_count_only_where_all_devices_stand_outside(handmade, case) -> None:
+    samples, every = case.samples.take(np.arange(20)), np.ones((1, 20), dtype=bool)
+
+    def stages(case: AuditCase, *, shadows: bool = True) -> tuple[bool, ...]:
+        made = device_cells(case, "projector", samples, every, shadows=shadows)
+        return made.stages
+
+    def come_near(document: dict[str, Any]) -> None:
+        workspace = document["requirements"]["workspace"]
+        workspace["projector_radius_m"] = [0.04, 1.1]
+
+    assert stages(case) == (False, True)
+    assert stages(case, shadows=False) == (False,)
+    assert stages(replace(case, plan=handmade.tampered(case.plan, come_near))) == (
         False,
     )
-    near = replace(space, projector_radius_m=(0.04, 1.1))
-    required = replace(case.plan.requirements, workspace=near)
-    within = replace(case, plan=_Asking(case.plan, required))
-    assert device_cells(within, "projector", samples, every, shadows=True).stages == (
-        False,
-    )
-
-
-class _Asking:
-    """A plan of other requirements."""
-
-    def __init__(self, plan: RigPlan, required: Requirements) -> None:
-        self._plan, self.requirements = plan, required
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._plan, name)

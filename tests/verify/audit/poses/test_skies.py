@@ -6,8 +6,8 @@ from support.plain_shapes import grid
 from geometry.arrays import Array
 from geometry.mesh.mesh import TriangleMesh
 from planning.verify.audit.audit_samples import AuditSamples
-from planning.verify.audit.poses.skies import Skies, SkyMaps
 from planning.verify.audit.predicates.occlusion import Shadow
+from planning.verify.audit.proofs.poses.skies import Skies, SkyMaps
 
 _CAP, _TANGENT = np.radians(65.0), np.radians(80.0)
 _PIXEL = np.radians(65.0) / 60.0

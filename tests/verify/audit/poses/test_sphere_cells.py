@@ -10,8 +10,12 @@ from geometry.arrays import Array
 from planning.model.bodies import Box
 from planning.model.requirements import Workspace
 from planning.verify.audit.devices.workspace_claims import outside_by
-from planning.verify.audit.poses.admissible_cells import may_stand
-from planning.verify.audit.poses.sphere_cells import Cells, of_parallel, seen_from
+from planning.verify.audit.proofs.poses.admissible_cells import may_stand
+from planning.verify.audit.proofs.poses.sphere_cells import (
+    Cells,
+    of_parallel,
+    seen_from,
+)
 
 _SHELL = (0.9, 1.3)
 _UPRIGHT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from geometry.arrays import Array, Ints, Mask
-from planning.verify.audit.poses.sphere_cells import Cells, of_parallel
-from planning.verify.audit.poses.too_few import (
+from planning.verify.audit.proofs.poses.sphere_cells import Cells, of_parallel
+from planning.verify.audit.proofs.poses.too_few import (
     Outcome,
     Question,
     in_open_pairs,
