@@ -97,12 +97,12 @@ def bound_projectors(
     if shadows and bound.status is not CellStatus.PROVED:
         among = searched(effort, shadows=True)
         # Cut short, a longer search may have proved less.
-        if among[0].lower_bound >= bound.lower_bound:
+        if shadows := among[0].lower_bound >= bound.lower_bound:
             bound, tree = among
     unrefuted = np.empty((0, 3))
     if bound.status in (CellStatus.SURVIVED, CellStatus.CUT):
         unrefuted = _promising(bound, tree, effort.offers)
-    shadows = shadows or bound.status is CellStatus.PROVED
+    shadows = shadows or question.count <= 1
     return ContinuousBound(question, bound, shadows, unrefuted)
 
 
