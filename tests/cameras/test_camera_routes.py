@@ -18,7 +18,12 @@ from geometry.shapes.primitives import sphere
 from planning import RigPlan
 from planning.cameras.baselines.widest_baselines import WidestBaselines
 from planning.cameras.camera_baselines import baseline_samples, held_to_candidates
-from planning.cameras.camera_cover import camera_candidate_views, candidate_cover
+from planning.cameras.camera_cover import (
+    _surely_enough,
+    camera_candidate_views,
+    candidate_cover,
+    measured_of,
+)
 from planning.cameras.camera_routes import (
     _clearly_wider,
     _loses,
@@ -44,7 +49,7 @@ from planning.proofs.quotas import required_samples
 from planning.report.summary.proof_lines import route_lines
 from planning.rig.rig import load_rig
 from planning.rings.ring_radii import uniform_radii
-from planning.scene.draws import Draw
+from planning.scene.draws import DRAWS, Draw
 from planning.scene.lights import ring_frame
 from planning.scene.measured import lit_samples, measured_by
 from planning.verify.audit.audit import audit_plan
@@ -418,3 +423,27 @@ def test_a_false_claim_of_the_routes_is_found(change, proof, said):
 def test_routes_that_are_no_claim_break_the_plan(change):
     with pytest.raises(ValueError, match=next(iter(change))):
         _failures(TRUE | change)
+
+
+def test_what_is_enough_of_all_that_is_lit_is_enough(ball, coarse):
+    """Whatever candidates reach; what isn't so may be enough of what they reach."""
+    (scene, projectors, _), cover = ball, coarse[0]
+    fresh = scene.target_samples(DRAWS.fresh_cameras)
+    lit, measured = measured_of(scene, projectors, cover.candidates, fresh)
+    reached, told = measured.any(axis=1).mean(), set[tuple[bool, bool]]()
+    for k in range(1, 1 + len(cover.cameras)):
+        chosen = cover.selection.chosen[:k]
+        few = replace(cover, selection=replace(cover.selection, chosen=chosen))
+        share = measured[:, chosen].any(axis=1).mean()
+        # Enough of all, of what is reached alone, and of neither.
+        for part in (0.99 * share, share * (1.0 + 1.0 / reached) / 2.0, 1.01 * share):
+            part = min(part, 1.0)
+            required = replace(scene.requirements, coverage=part)
+            other = replace(scene, requirements=required)
+            surely = _surely_enough(other, projectors, few, fresh)
+            among = candidate_cover(other, measured, lit, cover.candidates.cameras)
+            assert surely == (share >= part)
+            told.add((surely, among.enough(chosen)))
+    assert (True, False) not in told
+    assert {(True, True), (False, False)} <= told
+    assert (False, True) in told or reached == 1.0

@@ -43,6 +43,7 @@ from planning.report.summary.region_lines import (
 from planning.report.summary.shortfall import shortfalls
 from planning.scene.draws import DRAWS
 from planning.steps import stages
+from solvers.status import SolveStatus
 
 BALL = sphere(0.1, subdivisions=4)
 # Degrees of each face's normal off the light.
@@ -141,7 +142,7 @@ def _records(claims):
     )
 
 
-def test_of_the_largest_dark_region_without_a_floor_one_is_priced(world):
+def test_of_the_largest_dark_region_without_a_floor_one_is_priced(world, monkeypatch):
     scene, devices, claims = world
     up = np.array([0.0, 1.0, 0.0])
     below = look_at(np.array([0.0, 0.0, -1.1]), np.zeros(3), up=up)
@@ -165,6 +166,14 @@ def test_of_the_largest_dark_region_without_a_floor_one_is_priced(world):
         f"[requirements] region_share = {share:g} gives it a floor and takes "
         f"2 projectors of the candidates",
     )
+    # Where fewer weren't refuted, that so many are enough is all that is said.
+    found = SimpleNamespace(status=SolveStatus.FEASIBLE, selected=np.arange(2))
+    monkeypatch.setattr(
+        "planning.report.advice.floor_relaxations.solve_cover", lambda *_, **__: found
+    )
+    cut = with_small_floor(records, CandidateSet.over(scene, samples, poses))
+    (line,) = cut[3].coverage.relaxations
+    assert "takes at most 2 projectors" in line
 
 
 def test_a_relaxation_meets_the_floor_and_less_of_it_does_not(world):
