@@ -359,7 +359,8 @@ def tree_of(
     """Return the planner's cells with shadows; None where it would leave them out."""
     # As the planner's, cells of positions go on where the maps of shadows end.
     effort = Effort(finest=finest + 2, maps=finest, budget=1.0, shadows=np.inf)
-    question = BoundQuestion(len(rows), 2, len(rows), rows.samples.weight)
+    # One is enough, so that two are never proved and shadows are drawn.
+    question = BoundQuestion(1, 2, len(rows), rows.samples.weight)
     bound = bound_projectors(scene, (template,), rows, question, effort)
     tree = bound.found.tree
     assert isinstance(tree, DirectionTree | PositionTree)
