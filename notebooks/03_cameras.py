@@ -269,6 +269,7 @@ planned = plan_rig(
     dominant_coverage=0.99,
     coverage=0.95,
     region_coverage=0.0,
+    prove=True,
     check=False,
     on_miss="return",
 )

@@ -156,6 +156,10 @@ class Judge:
             here, made = plan.document.surface, self._plan.document.surface
             if (here.sha256, here.path) != (made.sha256, made.path):
                 return "refused"
+            here, made = (p.document.certificates.proof for p in (plan, self._plan))
+            # A file of another name isn't there, and told as believed.
+            if here and made and here.sha256 != made.sha256:
+                return "refused"
             found = any(self._false(plan, section, quick=quick))
             return "found" if found else "passed"
         except PlanningError:

@@ -226,5 +226,9 @@ def _unpacked(
         array = found.get(f"{of}_{name}")
         if array is None or array.dtype.kind != numbers or array.ndim != ndim:
             raise PlanFileError(f"`{of}_{name}` is missing, or of another kind")
-        values[name] = int(array) if ndim == 0 else array
+        # Sums of narrower numbers would wrap; of multipliers in 240ths all fit a byte.
+        width = {"i": np.int64, "f": np.float64, "u": np.uint8}[numbers]
+        if not np.can_cast(array.dtype, width):
+            raise PlanFileError(f"`{of}_{name}` holds {array.dtype}, not {width}")
+        values[name] = int(array) if ndim == 0 else array.astype(width)
     return values

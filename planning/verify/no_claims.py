@@ -27,6 +27,7 @@ NO_CLAIM = {
     "rig.*.name": "what a device is called; of which model one is, is a claim",
     "rig.*.sources": "where the author has a figure from, in words",
     "rig.calibration.description": "as rig.name",
+    "certificates.*.candidates.proof": "how it was found, in words",
     "coverage.relaxations": "advice",
     "coverage.camera_relaxations": "advice",
     "regions.*.coverage.relaxations": "advice",

@@ -28,6 +28,7 @@ ON_TRUST = {
         "certificates.*.bounds_leave_out",
         "certificates.*.excluded_pairs",
         "certificates.*.n_samples",
+        "certificates.*.required_m2",
         "certificates.*.n_regions",
         "certificates.*.status",
         "certificates.*.alone",
@@ -83,6 +84,8 @@ def taken_on_trust(
         figures_held: The same of the figures of its check.
         over_poses: What became of bounds over all poses; None: nothing was tried.
     """
+    if plan.document.reconstruction is None:
+        figures_held = EXACTLY
     if claims_held == WHOLLY:
         return _digits(("figures of the check", figures_held))
     lines = [*held_against_others(plan, over_poses)]

@@ -131,6 +131,8 @@ def asks(plan, **changes):
         ({"command": ["plan", *WORDS.split(), "--pareto"]}, "one of several"),
         ({"command": ["plan", "--mesh", "x.obj", "--madness"]}, "--madness"),
         ({"command": ["plan", "verify", "x"]}, "give --max-projectors"),
+        ({"command": ["plan", "--help"]}, "No such option"),
+        ({"command": ["plan", "--mesh", "x\0.obj"]}, "no command line does"),
         ({"truncated": True}, "the run was cut"),
     ],
 )

@@ -17,6 +17,7 @@ from planning.model.plan import RigPlan
 
 # Of these more than one plan comes, or none that its own words alone make.
 _NOT_ALONE = ("pareto", "take", "watch")
+_REFUSED = "command: {}, so it can't be planned again; verify without --replan"
 
 
 class PlannedAgain:
@@ -77,11 +78,17 @@ def _options(plan: RigPlan, mesh: Path | None, rig: str | None) -> dict[str, Any
     """
     words = plan.document.command
     try:
+        if any("\0" in word for word in words):
+            raise click.UsageError("its words hold what no command line does")
         if words[:1] != ("plan",):
             raise click.UsageError("no words of a command are recorded")
         stands = words[1:2] == ("evaluate",)
         declared = evaluate if stands else rig_command
-        options = declared.make_context("plan", list(words[1 + stands :])).params
+        # Nothing but what plans: help would print, and end in 0.
+        context = declared.make_context(
+            "plan", list(words[1 + stands :]), help_option_names=[]
+        )
+        options = context.params
         if mesh is not None:
             options |= {"meshes": (str(mesh),), "files": ()}
         options |= {} if rig is None else {"rig_name": rig}
@@ -95,8 +102,5 @@ def _options(plan: RigPlan, mesh: Path | None, rig: str | None) -> dict[str, Any
         if plan.document.truncated:
             raise click.UsageError("the run was cut, and another isn't cut there")
     except click.ClickException as error:
-        raise InputError(
-            f"command: {error.format_message()}, so it can't be planned again; verify "
-            f"without --replan"
-        ) from None
+        raise InputError(_REFUSED.format(error.format_message())) from None
     return options

@@ -21,6 +21,8 @@ from .refutation import RefutedProofError
 _NEAR = 1e-9
 # Draws of one proof, and samples of all: more is no file of ours.
 _MOST_DRAWS, _MOST_SAMPLES = 16, 100_000
+# Of one draw: fewer don't speak of a surface, and could be picked.
+_FEWEST_SAMPLES = 250
 
 
 def covered_by_candidates(case: AuditCase, kind: str, samples: AuditSamples) -> Mask:
@@ -67,9 +69,12 @@ def drawn_again(
         and counts.sum() <= _MOST_SAMPLES
         and np.all(draws[:, 1:] >= 0)
         and np.all(draws[:, 2] >= 1)
+        and np.all(-(-counts // np.maximum(draws[:, 2], 1)) >= _FEWEST_SAMPLES)
         and len(np.unique(draws[:, 1])) == len(counts)
     ):
-        raise RefutedProofError("its draws can't be made again")
+        raise RefutedProofError(
+            f"its draws can't be made again, or one gives less than {_FEWEST_SAMPLES}"
+        )
     for count, stream, every in draws.tolist():
         mixed = np.random.SeedSequence([plan.document.seed, stream])
         seed = int(mixed.generate_state(1)[0])

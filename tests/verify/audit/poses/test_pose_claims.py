@@ -25,6 +25,7 @@ from planning.verify.trust import OVER_POSES, taken_on_trust
 _KINDS = ("projector", "camera")
 _STREAMS = {"projector": 100, "camera": 200}
 _N = 300
+_NARROW: Any = np.full(3, 127, dtype=np.int8)
 
 
 @pytest.fixture(scope="module", params=["diverging", "parallel"])
@@ -196,8 +197,9 @@ def test_less_area_than_can_be_derived_stays_claimed(case) -> None:
 
 _EDITS: dict[str, dict[str, object]] = {
     "samples aren't": {"draws": np.array([[_N, 101, 1]])},
+    "less than 250": {"draws": np.array([[_N, 100, 2]])},
     "made again": {"draws": np.array([[_N, 100, 0]])},
-    "of 200 samples": {"multipliers": np.ones(200, dtype=np.int64)},
+    "of its 200 samples": {"multipliers": np.ones(200, dtype=np.int64)},
 }
 
 
@@ -207,6 +209,21 @@ def test_another_set_of_samples_is_refused(case, words) -> None:
     assert "projector" not in bounds
     assert len(false) == 1
     assert words in false[0]
+
+
+def test_sums_of_narrow_numbers_do_not_wrap() -> None:
+    file = ProofFile.of(
+        {}, {"camera": PoseProof(np.zeros((1, 3), int), np.zeros(3, int), 1, _NARROW)}
+    )
+    read = ProofFile(file.content).over_poses["camera"].multipliers
+    assert read.dtype == np.int64
+    assert int(read.sum()) == 3 * 127
+    unsigned = _NARROW.astype(np.uint64).view(np.uint64)
+    with pytest.raises(PlanFileError, match="of another kind"):
+        _ = ProofFile.of(
+            {},
+            {"camera": PoseProof(np.zeros((1, 3), int), np.zeros(3, int), 1, unsigned)},
+        ).over_poses
 
 
 def test_a_certificate_that_is_missing_is_refused(case) -> None:

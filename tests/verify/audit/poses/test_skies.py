@@ -1,12 +1,14 @@
 """Skies of samples on which what is closed is known in closed form."""
 
 import numpy as np
+import pytest
 from support.plain_shapes import grid
 
 from geometry.arrays import Array
 from geometry.mesh.mesh import TriangleMesh
 from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.predicates.occlusion import Shadow
+from planning.verify.audit.proofs.poses.outlines import Outlines
 from planning.verify.audit.proofs.poses.skies import Skies, SkyMaps
 
 _CAP, _TANGENT = np.radians(65.0), np.radians(80.0)
@@ -82,6 +84,38 @@ def test_a_wall_closes_what_is_behind_it() -> None:
     margin = np.minimum(sides, np.arcsin((20.0 * x - z) / 401.0**0.5))
     assert shut[margin > 5.0 * _PIXEL].all()
     assert shut.sum() > 4000
+
+
+@pytest.mark.parametrize("back", [[[3, 2, 4], [3, 4, 5]], [[3, 4, 2], [3, 5, 4]]])
+def test_a_ridge_is_an_outline_however_its_faces_are_wound(back) -> None:
+    # A wall at x = 1, 20 high, and a slope behind it from its top down to x = 5.
+    ends = [-1.0, 1.0]
+    front = [(1.0, y, 0.0) for y in ends] + [(1.0, y, 20.0) for y in ends[::-1]]
+    corners = np.array([*front, *((5.0, y, 0.0) for y in ends[::-1])])
+    faces = np.array([[0, 1, 2], [0, 2, 3], *back])
+    sky = _sky(
+        TriangleMesh.joined([_ground(), TriangleMesh(corners, faces)]),
+        (0.0, 0.0, 0.0),
+        0.0,
+    )
+    towards = _within_cap(40_000)
+    none, (x, y, z) = np.zeros(len(towards), dtype=np.int64), towards.T
+    behind = (x > 0.0) & (np.abs(y) < x) & (z < 20.0 * x)
+    shut = sky.closed(none, towards, np.zeros(len(towards)))
+    assert not (shut & ~behind).any()
+    assert shut.sum() > 4000
+
+
+def test_a_face_of_three_at_an_edge_has_a_border_of_its_own() -> None:
+    corners = np.array(
+        [[0.0, 0, 0], [1.0, 0, 0], [0.0, 1, 0], [0.0, -1, 0], [0.0, 0, 1]]
+    )
+    mesh = TriangleMesh(corners, np.array([[0, 1, 2], [0, 4, 1], [0, 3, 1]]))
+    outlines = Outlines(mesh)
+    sides = outlines.sides(np.array([0.3, 0.4, 2.0]))
+    for face in range(3):
+        alone = outlines.of_faces(sides, np.arange(3) == face)
+        assert set(alone) == set(mesh.edges.of_face[face])
 
 
 def test_a_face_that_touches_the_sample_blocks_nothing() -> None:

@@ -38,14 +38,25 @@ class Outlines:
         return self.mesh.corners.min(axis=1), self.mesh.corners.max(axis=1)
 
     @cached_property
-    def _faces(self) -> tuple[Ints, Ints]:
-        """A face of each edge, and its other one, or the same where it has one."""
+    def _faces(self) -> tuple[Ints, Ints, Mask]:
+        """A face of each edge, its other one, and whether both are wound alike.
+
+        The same twice where it has one.
+        """
         of_face = self.mesh.edges.of_face.ravel()
-        face = np.arange(len(of_face)) // 3
+        side = np.arange(len(of_face))
         first, last = (np.zeros(len(self.mesh.edges.ends), np.int64) for _ in range(2))
-        last[of_face] = face
-        first[of_face[::-1]] = face[::-1]
-        return first, last
+        last[of_face] = side
+        first[of_face[::-1]] = side[::-1]
+        faces = self.mesh.faces
+        rising = (faces < faces[:, [1, 2, 0]]).ravel()
+        return first // 3, last // 3, rising[first] != rising[last]
+
+    def _any_of(self, some: Mask) -> Mask:
+        """Return which edges some of the faces have, however many others do."""
+        edges: Mask = np.zeros(len(self.mesh.edges.ends), dtype=bool)
+        edges[self.mesh.edges.of_face[some]] = True
+        return edges
 
     def sides(self, point: Array) -> Array:
         """Return how far a point is before the plane of each face [m], (n_f,)."""
@@ -60,15 +71,16 @@ class Outlines:
 
     def of_faces(self, sides: Array, some: Mask) -> Ints:
         """Return the edges that are outlines of some of the faces, (k,)."""
-        first, last = self._faces
+        first, last, alike = self._faces
         n_faces = self.mesh.edges.n_faces
         side = np.sign(sides)
         side[np.abs(sides) <= _UNCALLED * self.size] = np.nan
         here, there = some[first], some[last]
-        # NaN equals nothing: what isn't called is an outline.
-        folded = side[first] != side[last]
+        # NaN equals nothing: what isn't called is an outline. Of faces that aren't
+        # wound alike a point is before one and behind the other where it sees no fold.
+        folded = side[first] != np.where(alike, side[last], -side[last])
         alone = (here != there) | (n_faces != 2)
-        return np.flatnonzero((here | there) & (folded | alone))
+        return np.flatnonzero(self._any_of(some) & (folded | alone))
 
     def above(self, point: Array, normal: Array, edges: Ints) -> Mask:
         """Return which edges have an end before the plane of a point, (k,)."""
