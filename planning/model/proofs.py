@@ -112,6 +112,10 @@ class PoseProof:
         multipliers: Of the first samples, those that the bound speaks of, shape (k,).
     """
 
+    # Samples come in the order of faces, so a part of a draw is of a part of the
+    # surface: most must be of draws of which all are taken.
+    least_whole: ClassVar[float] = 0.8
+
     draws: Ints
     faces: Ints
     n_devices: int
@@ -128,6 +132,12 @@ class PoseProof:
         )
         if not whole:
             raise PlanFileError("its arrays don't fit each other")
+
+    @property
+    def n_whole(self) -> int:
+        """How many of the samples are of draws of which all are taken."""
+        ends = np.cumsum(-(-self.draws[:, 0] // self.draws[:, 2]))
+        return int(ends[ends <= len(self.multipliers)].max(initial=0))
 
 
 @dataclass(frozen=True, eq=False)

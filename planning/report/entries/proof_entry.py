@@ -103,7 +103,8 @@ _Frozen = tuple[_Ints, NDArray[np.float64], _Ints, _Ints]
 def _over_poses(frozen: _Frozen, refutation: Refutation | None) -> PoseProof | None:
     """Return the certificate over all poses, of all samples up to its last one.
 
-    None where there is none, or of a cover of more samples.
+    None where there is none, or of a cover of more samples, or largely of a part of a
+    draw.
     """
     draws, points, faces, where = frozen
     if refutation is None or len(refutation.multipliers) > len(where):
@@ -112,7 +113,8 @@ def _over_poses(frozen: _Frozen, refutation: Refutation | None) -> PoseProof | N
     last = where[n] if n < len(where) else len(points)
     every = np.zeros(last, dtype=np.int64)
     every[where[:n]] = refutation.multipliers
-    return PoseProof(draws, faces, refutation.n_devices, every)
+    proof = PoseProof(draws, faces, refutation.n_devices, every)
+    return proof if proof.n_whole >= proof.least_whole * len(every) else None
 
 
 def _projector_draws() -> Iterable[list[tuple[Draw, int]]]:

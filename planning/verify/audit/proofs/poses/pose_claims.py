@@ -26,8 +26,6 @@ from .too_few import Outcome, Question, most_of_one
 
 # Share of the samples by which lit ones may differ from those that were planned.
 _LIT = 0.01
-# Least share of the samples that must be of draws of which all are taken.
-_WHOLE = 0.8
 _EVERY_S = 5.0
 
 
@@ -122,11 +120,10 @@ def _derived(
     if proof.n_devices + 1 + given < table.lower_bound:
         raise RefutedProofError(f"the certificate is of {proof.n_devices + 1 + given}")
     every, n = drawn_again(case, proof.draws, proof.faces), len(proof.multipliers)
-    # Samples come in the order of faces: a part of a draw is of a part of the surface.
-    ends = np.cumsum(-(-proof.draws[:, 0] // proof.draws[:, 2]))
-    whole = int(ends[ends <= n].max(initial=0))
-    if n == 0 or whole < _WHOLE * n:
-        raise RefutedProofError(f"of its {n} samples {whole} are of whole draws")
+    if n == 0 or proof.n_whole < proof.least_whole * n:
+        raise RefutedProofError(
+            f"of its {n} samples {proof.n_whole} are of whole draws"
+        )
     lit_by = lit_by_plan(case, kind.name, every)
     lit = np.any(lit_by, axis=0)
     n_samples = int(lit[:n].sum())
