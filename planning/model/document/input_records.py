@@ -1,7 +1,7 @@
 """What a plan was made from: `meshes`, `surface`, `rig` and `ranges`."""
 
 from collections.abc import Iterable
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -93,7 +93,7 @@ class FocusFigures(Part):
     """A lens set to one distance."""
 
     distance_mm: float
-    f_number: float
+    f_number: Annotated[float, Field(gt=0.0)]
     blur_px: float
 
 
@@ -232,6 +232,16 @@ class RigRecord(Part):
     head: HeadRecord | None = None
     turntable: TurntableRecord | None = None
     stations: CarrierRecord | None = None
+
+    @model_validator(mode="after")
+    def _numbers(self) -> Self:
+        margin, floor = self.rings.get("margin_m", 0.0), self.workspace.get("floor_mm")
+        for key, value in (("rings.margin_m", margin), ("workspace.floor_mm", floor)):
+            if not isinstance(value, float | int | None) or (
+                value is None and key.startswith("rings")
+            ):
+                raise ValueError(f"{key} = {value!r} should be a number")
+        return self
 
     def models(self, kind: str) -> tuple[ModelRecord, ...]:
         """Return the models of a `projector` or a `camera`, the first one first."""
