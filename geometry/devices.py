@@ -11,9 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from geometry.arrays import lengths
-
-from .arrays import Array, Length, Mask
+from .arrays import Array, Length, Mask, lengths
 
 _UNDISTORT_STEPS = 12
 _AHEAD = np.array([0.0, 0.0, 1.0])

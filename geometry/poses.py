@@ -10,9 +10,7 @@ Device frames are right-handed with +x right, +y down and +z along the optical a
 
 import numpy as np
 
-from geometry.arrays import lengths
-
-from .arrays import Array
+from .arrays import Array, lengths
 
 
 def look_at(positions: Array, targets: Array, up: Array, *, roll: float = 0.0) -> Array:

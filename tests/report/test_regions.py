@@ -26,6 +26,7 @@ from planning.model.document.coverage_records import RegionRecord
 from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
 from planning.projectors.candidate_set import CandidateSet
+from planning.report.advice import floor_relaxations
 from planning.report.advice.floor_relaxations import (
     with_floor_relaxations,
     with_small_floor,
@@ -168,12 +169,9 @@ def test_of_the_largest_dark_region_without_a_floor_one_is_priced(world, monkeyp
     )
     # Where fewer weren't refuted, that so many are enough is all that is said.
     found = SimpleNamespace(status=SolveStatus.FEASIBLE, selected=np.arange(2))
-    monkeypatch.setattr(
-        "planning.report.advice.floor_relaxations.solve_cover", lambda *_, **__: found
-    )
+    monkeypatch.setattr(floor_relaxations, "solve_cover", lambda *_, **__: found)
     cut = with_small_floor(records, CandidateSet.over(scene, samples, poses))
-    (line,) = cut[3].coverage.relaxations
-    assert "takes at most 2 projectors" in line
+    assert "takes at most 2 projectors" in cut[3].coverage.relaxations[0]
 
 
 def test_a_relaxation_meets_the_floor_and_less_of_it_does_not(world):
