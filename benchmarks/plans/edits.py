@@ -40,6 +40,7 @@ import numpy as np
 from benchmarks.machine import machine
 from planning import RigPlan
 from planning.cli.checks.planned_again import PlannedAgain
+from planning.cli.declared.asked_again import asked_again
 from planning.cli.other_commands import write_sample
 from planning.model.document.check_records import ReconstructionRecord
 from planning.model.document.request_records import asked_digest
@@ -124,7 +125,7 @@ class Judge:
         self._plan, self.document = plan, plan.to_document()
         self._case, self._made = found.audit.case, made_again(plan, threads=1)
         self._fresh = found.reconstruction.record()
-        self._whole = PlannedAgain(plan, None, quiet=True)(plan, 1)
+        self._whole = PlannedAgain(plan, asked_again(plan), quiet=True)(plan, 1)
         assert hold_claims(plan, lambda *_: self._whole, 1) == ((), WHOLLY)
 
     def differs_planned_again(self, path: KeyPath, value: object) -> bool:

@@ -184,7 +184,7 @@ def test_json_is_one_object_and_nothing_else(runs):
 
 def test_ctrl_c_before_a_first_plan_leaves_nothing_and_exits_130(face, tmp_path):
     code = (
-        "import planning.cli.plan_command as c, sys\n"
+        "import planning.cli.plans.plan_command as c, sys\n"
         "def stop(*a, **k): raise KeyboardInterrupt\n"
         "c.plan_rig = stop\n"
         f"sys.argv = ['plan', '--mesh', {str(face)!r}, '--max-projectors', '3']\n"
@@ -220,8 +220,8 @@ def test_a_signal_while_a_plan_is_saved_costs_no_second_saving(
         os.kill(os.getpid(), signal.SIGTERM)
         return draw_rig(plan, **options)
 
-    monkeypatch.setattr("planning.cli.plan_command.plan_rig", made)
-    monkeypatch.setattr("planning.cli.saved_plans.draw_rig", draw)
+    monkeypatch.setattr("planning.cli.plans.plan_command.plan_rig", made)
+    monkeypatch.setattr("planning.cli.plans.saved_plans.draw_rig", draw)
     words = ["--mesh", folder / "face.obj", "--max-projectors", 3, "-o", tmp_path]
     code, _, _ = in_process(monkeypatch, capsys, *words)
     assert (code, saved) == (130, [plan])
@@ -350,7 +350,7 @@ def test_a_share_may_be_given_in_percent(
         asked.update(options)
         raise planning.InputError("enough")
 
-    monkeypatch.setattr("planning.cli.plan_command.plan_rig", plan_rig)
+    monkeypatch.setattr("planning.cli.plans.plan_command.plan_rig", plan_rig)
     words = [face, "--max-projectors", 3, "--coverage", written, "-o", tmp_path / "o"]
     assert in_process(monkeypatch, capsys, *words)[0] == 3
     assert asked["coverage"] == share

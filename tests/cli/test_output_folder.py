@@ -10,7 +10,7 @@ from PIL import Image
 
 from planning.cli import output_folder
 from planning.cli.output_folder import exchanged, uninterrupted
-from planning.cli.saved_plans import SavedPlans
+from planning.cli.plans.saved_plans import SavedPlans
 from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
 

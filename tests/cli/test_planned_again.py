@@ -10,6 +10,7 @@ from support.little_work import work_little
 from support.small_job import RIG
 
 from planning.cli.checks.planned_again import PlannedAgain
+from planning.cli.declared.asked_again import asked_again
 from planning.cli.main import commands
 from planning.cli.other_commands import write_sample
 from planning.model.errors import InputError
@@ -51,7 +52,9 @@ def made(folder, plan, tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(tmp_path_factory.mktemp("elsewhere"))
         mesh, rig = folder / "head.obj", folder / "few.toml"
-        return PlannedAgain(plan, mesh, str(rig), quiet=True)(plan, 2)
+        return PlannedAgain(plan, asked_again(plan, mesh, str(rig)), quiet=True)(
+            plan, 2
+        )
 
 
 def held(plan, made, change):
@@ -138,7 +141,7 @@ def asks(plan, **changes):
 )
 def test_what_can_t_be_planned_again_is_said_in_a_line(plan, changes, why):
     with pytest.raises(InputError, match=f"({why}).*without --replan"):
-        PlannedAgain(asks(plan, **changes), None, quiet=True)
+        asked_again(asks(plan, **changes))
 
 
 def test_a_plan_that_doesn_t_say_its_words_exits_3(folder, tmp_path):

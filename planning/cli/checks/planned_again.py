@@ -5,19 +5,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import click
-
 from planning.cache.cache import NO_CACHE
-from planning.cli.declared.evaluate_declared import as_of_plans, evaluate
-from planning.cli.declared.plan_checks import check_options, check_projectors
-from planning.cli.declared.plan_declared import rig_command
-from planning.cli.plan_command import planned_once
-from planning.model.errors import InputError
+from planning.cli.plans.plan_command import planned_once
 from planning.model.plan import RigPlan
-
-# Of these more than one plan comes, or none that its own words alone make.
-_NOT_ALONE = ("pareto", "take", "watch")
-_REFUSED = "command: {}, so it can't be planned again; verify without --replan"
 
 
 class PlannedAgain:
@@ -28,16 +18,14 @@ class PlannedAgain:
 
     Args:
         plan: The plan, as written; its members are known, too.
-        mesh: The mesh to plan; None: the one that the command names.
-        rig: Likewise the rig, a preset or a file.
+        options: What its command asked for, from `asked_again`.
         quiet: Whether nothing is told on the way.
     """
 
     def __init__(
-        self, plan: RigPlan, mesh: Path | None, rig: str | None = None, *, quiet: bool
+        self, plan: RigPlan, options: Mapping[str, Any], *, quiet: bool
     ) -> None:
-        self._plan, self._quiet = plan, quiet
-        self._options = _options(plan, mesh, rig)
+        self._plan, self._options, self._quiet = plan, options, quiet
         self._made: RigPlan | None = None
 
     def __call__(self, plan: RigPlan, threads: int) -> Mapping[str, Any]:
@@ -62,45 +50,9 @@ class PlannedAgain:
                 "no_report": True,
             }
             planned_once(
-                self._options | written,
+                {**self._options, **written},
                 self._plan.document.command[1:],
                 NO_CACHE,
                 show=False,
             )
             return RigPlan.load(Path(folder) / "plan" / "plan.json")
-
-
-def _options(plan: RigPlan, mesh: Path | None, rig: str | None) -> dict[str, Any]:
-    """Return the options that a plan's command has.
-
-    Raises:
-        InputError: If it isn't one that plans once.
-    """
-    words = plan.document.command
-    try:
-        if any("\0" in word for word in words):
-            raise click.UsageError("its words hold what no command line does")
-        if words[:1] != ("plan",):
-            raise click.UsageError("no words of a command are recorded")
-        stands = words[1:2] == ("evaluate",)
-        declared = evaluate if stands else rig_command
-        # Nothing but what plans: help would print, and end in 0.
-        context = declared.make_context(
-            "plan", list(words[1 + stands :]), help_option_names=[]
-        )
-        options = context.params
-        if mesh is not None:
-            options |= {"meshes": (str(mesh),), "files": ()}
-        options |= {} if rig is None else {"rig_name": rig}
-        if stands:
-            as_of_plans(options)
-        else:
-            check_options(options)
-            check_projectors(options)
-        if any(options[name] for name in _NOT_ALONE):
-            raise click.UsageError("its plan is one of several")
-        if plan.document.truncated:
-            raise click.UsageError("the run was cut, and another isn't cut there")
-    except click.ClickException as error:
-        raise InputError(_REFUSED.format(error.format_message())) from None
-    return options

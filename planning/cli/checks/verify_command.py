@@ -1,6 +1,6 @@
 """What `plan verify` does."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,10 +24,14 @@ from planning.verify.reconstruction.scanner import Scanner
 from planning.verify.verification import verify_plan
 
 
-def verify_command(options: Mapping[str, Any]) -> int:
+def verify_command(
+    options: Mapping[str, Any],
+    asked_again: Callable[[RigPlan, Path | None, str | None], dict[str, Any]],
+) -> int:
     """Audit and check a plan; return 0 if every claim holds, 1 if not.
 
-    With `strict` also 1 if anything was taken on trust.
+    With `strict` also 1 if anything was taken on trust. Of a plan, and the mesh and rig
+    that take their places, `asked_again` says what its command asked for.
     """
     plan = RigPlan.load(options["plan_file"])
     mesh = None
@@ -37,9 +41,8 @@ def verify_command(options: Mapping[str, Any]) -> int:
     threads = options["threads"] or n_threads()
     again = again_or_why_not
     if options["replan"]:
-        again = PlannedAgain(
-            plan, options["mesh"], options["rig"], quiet=options["quiet"]
-        )
+        asked = asked_again(plan, options["mesh"], options["rig"])
+        again = PlannedAgain(plan, asked, quiet=options["quiet"])
     with progress(quiet=options["quiet"]) as report:
         verification = verify_plan(
             plan,

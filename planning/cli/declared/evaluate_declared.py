@@ -53,7 +53,7 @@ def evaluate(**options: Any) -> None:  # noqa: ANN401
     Writes a folder like that of a plan, NAME-evaluation: coverage, causes, rings and
     the check from pixels. Exit 1 where a requirement is missed.
     """
-    from planning.cli.plan_command import plan_command
+    from planning.cli.plans.plan_command import plan_command
 
     as_of_plans(options)
     run(lambda: plan_command(options, sys.argv[1:]), debug=options["debug"])

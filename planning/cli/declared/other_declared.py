@@ -82,7 +82,9 @@ def verify(**options: Any) -> None:  # noqa: ANN401
         raise click.UsageError("--rig is what --replan plans with: give both")
     from planning.cli.checks.verify_command import verify_command
 
-    run(lambda: verify_command(options), debug=options["debug"])
+    from .asked_again import asked_again
+
+    run(lambda: verify_command(options, asked_again), debug=options["debug"])
 
 
 @click.command()

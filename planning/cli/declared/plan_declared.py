@@ -283,8 +283,8 @@ class GroupedCommand(click.Command):
 @output_options
 def rig_command(**options: Any) -> None:  # noqa: ANN401
     """Plan a rig for a mesh, or for ranges (the default command)."""
-    from planning.cli.front.front_command import front_command
-    from planning.cli.plan_command import plan_command
+    from planning.cli.plans.front_command import front_command
+    from planning.cli.plans.plan_command import plan_command
 
     check_options(options)
     if options["pareto"] or options["take"] is not None:
@@ -295,5 +295,5 @@ def rig_command(**options: Any) -> None:  # noqa: ANN401
         run(lambda: front_command(options), debug=options["debug"])
     if options["watch"] is not None:
         check_watch(options)
-        from planning.cli.watch_command import watch_command as plan_command
+        from planning.cli.plans.watch_command import watch_command as plan_command
     run(lambda: plan_command(options, sys.argv[1:]), debug=options["debug"])

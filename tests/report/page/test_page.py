@@ -16,7 +16,7 @@ from click.testing import CliRunner
 from support.handmade import save, tampered, unclaimed
 
 from planning.cli.main import commands
-from planning.cli.saved_plans import SavedPlans
+from planning.cli.plans.saved_plans import SavedPlans
 from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
 from planning.report.page.outline import outlines
@@ -297,7 +297,7 @@ def test_the_command_writes_the_page_and_spares_what_is_none(tmp_path, plan):
 def test_a_run_without_time_for_the_page_says_so(tmp_path, plan, monkeypatch):
     said = []
     saved = SavedPlans(tmp_path, said.append, patterns=False)
-    slow = "planning.cli.saved_plans.write_page"
+    slow = "planning.cli.plans.saved_plans.write_page"
     monkeypatch.setattr(slow, lambda *_, **__: time.sleep(20.0))
     saved.write_page(plan, Stopwatch(time_limit=0.01), 1)
     assert "plan report" in said[-1]

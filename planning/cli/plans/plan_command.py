@@ -9,6 +9,8 @@ import click
 from geometry.mesh.mesh import TriangleMesh
 from geometry.parallel import n_threads
 from planning.cache.cache import NO_CACHE, Cache
+from planning.cli.console import print_json, progress, reporter, writable
+from planning.cli.lines.object_lines import optics_lines, size_lines
 from planning.model.errors import InputError
 from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
 from planning.model.progress import Report, Stopwatch
@@ -23,9 +25,7 @@ from planning.scene.ranges.ranged_body import RangedBody, read_ranges
 from planning.steps.checked import missed_by
 from planning.steps.recalled_mesh import recalled_mesh
 
-from .console import print_json, progress, reporter, writable
-from .front.kept_fronts import front_folder, taken_point
-from .lines.object_lines import optics_lines, size_lines
+from .kept_fronts import front_folder, taken_point
 from .saved_plans import SavedPlans
 
 # Options that `plan_rig` takes as they are.
@@ -153,17 +153,25 @@ def planned_once(
         if not options["no_report"] and not interrupted:
             saved.write_page(plan, clock, threads)
     missed = () if interrupted else missed_by(plan, check=check)
-    if not show:
-        pass
-    elif options["as_json"]:
-        ours = {"files": saved.files, "missed": list(missed)}
-        print_json(plan.to_document() | ours)
-    else:
-        words = summary if options["verbose"] else brief
-        click.echo(words(plan, saved.files, missed))
+    if show:
+        _print_result(options, plan, saved.files, missed)
     if interrupted:
         return InterruptedPlanError.exit_code, plan
     return RequirementError.exit_code if missed else 0, plan
+
+
+def _print_result(
+    options: Mapping[str, Any],
+    plan: RigPlan,
+    files: Sequence[str],
+    missed: Sequence[str],
+) -> None:
+    if options["as_json"]:
+        ours = {"files": list(files), "missed": list(missed)}
+        print_json(plan.to_document() | ours)
+    else:
+        words = summary if options["verbose"] else brief
+        click.echo(words(plan, files, missed))
 
 
 def timed(options: Mapping[str, Any], begin: float | None) -> Stopwatch:

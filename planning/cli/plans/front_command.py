@@ -8,7 +8,6 @@ import click
 
 from planning.cli.console import print_json, progress, writable
 from planning.cli.lines.front_lines import front_csv, front_lines
-from planning.cli.plan_command import read_fixed, read_object, timed
 from planning.model.files import write_together
 from planning.report.drawing.front_picture import draw_front
 from planning.rig.rig import load_rig
@@ -18,6 +17,7 @@ from planning.steps.front.kept_front import FRONT_FILE, KeptFront
 from planning.steps.front.plan_front import plan_front
 
 from .kept_fronts import front_folder
+from .plan_command import read_fixed, read_object, timed
 
 CSV_FILE, PICTURE_FILE = "pareto.csv", "pareto.png"
 # Options that are wishes by the same name.

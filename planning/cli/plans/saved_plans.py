@@ -4,6 +4,7 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from geometry.arrays import Array
+from planning.cli.output_folder import OWNED, exchanged, uninterrupted
 from planning.model.errors import TimeLimitError
 from planning.model.plan import RigPlan
 from planning.model.progress import TIME_IS_UP, Report, Stopwatch, untimed
@@ -14,8 +15,6 @@ from planning.report.page.page import PAGE, error_by_face, is_page, write_page
 from planning.verify.reconstruction.pattern_files import write_patterns
 from planning.verify.reconstruction.scanner import Scanner
 from planning.verify.verdict import Verification
-
-from .output_folder import OWNED, exchanged, uninterrupted
 
 
 class SavedPlans:

@@ -8,11 +8,11 @@ from typing import Any
 
 from geometry.mesh.mesh import MeshError
 from planning.cache.cache import Cache
+from planning.cli.console import tell
+from planning.cli.lines.comparison import compared
 from planning.model.errors import PlanningError
 from planning.model.plan import InterruptedPlanError, RigPlan
 
-from .console import tell
-from .lines.comparison import compared
 from .plan_command import cache_of, planned_once
 
 # How often files are looked at, and how long one stays as it is before it is read: what

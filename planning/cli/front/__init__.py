@@ -1,1 +1,0 @@
-"""Fronts of numbers of devices: `plan --pareto`, and `--take`."""

@@ -1,0 +1,1 @@
+"""What `plan` does: one plan, a front of them, or again whenever the rig changes."""
