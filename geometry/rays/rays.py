@@ -97,6 +97,15 @@ class RayCaster:
         self.share(trace, self.chunks(len(directions)))
         return blocked
 
+    def met(self, origins: Array, directions: Array) -> Mask:
+        """Return whether anything is hit at all by rays that begin near the mesh.
+
+        As `occluded`; sooner than `first_hits`, which looks for what is hit first.
+        """
+        # Farther than this from a place near the surface there is none of it.
+        beyond = np.full(len(directions), 4.0 * self.reach / self.scale)
+        return self.occluded(origins, directions, beyond)
+
     def blocked_local(self, start: Single, along: Single, reach: Single) -> Mask:
         """Return whether rays in the caster's own frame are blocked; checks nothing.
 

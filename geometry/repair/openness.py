@@ -137,8 +137,5 @@ def look_out(
             + (side * height)[:, None] * normal[:, None]
         ).reshape(-1, 3)
         start = np.repeat(spots.points[part] + offset * normal, n_rays, axis=0)
-        # Farther than this from a point of the surface there is none of it.
-        beyond = np.full(len(along), 4.0 * caster.reach / caster.scale)
-        blocked = caster.occluded(start, along, beyond)
-        escaped[part] = (~blocked).reshape(-1, n_rays).sum(axis=1)
+        escaped[part] = (~caster.met(start, along)).reshape(-1, n_rays).sum(axis=1)
     return escaped

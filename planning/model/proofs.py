@@ -50,6 +50,11 @@ _OF_POSES: _Fields = {
 _MOST_MULTIPLIERS = 1 << 27
 
 
+def sizes_of(draws: Ints) -> Ints:
+    """Return how many samples each draw gives, of which every so many-th is taken."""
+    return -(-draws[:, 0] // np.maximum(draws[:, 2], 1))
+
+
 @dataclass(frozen=True, eq=False)
 class CoverProof:
     """That no `n_sets` candidates cover as many of the samples as are required.
@@ -114,7 +119,7 @@ class PoseProof:
 
     # Samples come in the order of faces, so a part of a draw is of a part of the
     # surface: most must be of draws of which all are taken.
-    least_whole: ClassVar[float] = 0.8
+    _least_whole: ClassVar[float] = 0.8
 
     draws: Ints
     faces: Ints
@@ -136,8 +141,14 @@ class PoseProof:
     @property
     def n_whole(self) -> int:
         """How many of the samples are of draws of which all are taken."""
-        ends = np.cumsum(-(-self.draws[:, 0] // self.draws[:, 2]))
+        ends = np.cumsum(sizes_of(self.draws))
         return int(ends[ends <= len(self.multipliers)].max(initial=0))
+
+    @property
+    def is_of_whole_draws(self) -> bool:
+        """Whether enough of its samples are, and it has any."""
+        n = len(self.multipliers)
+        return n > 0 and self.n_whole >= self._least_whole * n
 
 
 @dataclass(frozen=True, eq=False)

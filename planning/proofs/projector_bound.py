@@ -85,7 +85,8 @@ def bound_projectors(
             opened[~_within(cube, scene.requirements.workspace, aside)] = 0
             tree = DirectionTree.over(opened, len(samples))
         else:
-            tree = _positions(scene, templates, samples, effort, opened)
+            maps = WidenedMaps(opened, cube), WidenedMaps(~opened, cube)
+            tree = _positions(scene, templates, samples, maps, effort.finest)
         return question.searched(tree, effort.budget, known), tree
 
     # Shadows cost most, and what is proved without them holds with them.
@@ -110,20 +111,20 @@ def _positions(
     scene: Scene,
     templates: Sequence[PlannedProjector],
     samples: Target,
-    effort: Effort,
-    opened: NDArray[np.uint64],
+    maps: tuple[WidenedMaps, WidenedMaps],
+    finest: int,
 ) -> PositionTree:
-    """Return the cells of positions, for the directions open to samples as bit rows."""
-    workspace, cube = scene.requirements.workspace, CubeMap(1 << effort.maps)
+    """Return the cells of positions, by what is open to samples and what is closed."""
+    workspace, (opened, closed) = scene.requirements.workspace, maps
     ranges = [template.device.range_m for template in templates]
     return PositionTree(
         workspace,
         workspace.projector_radius_m,
         (min(least for least, _ in ranges), max(most for _, most in ranges)),
         samples.samples.points,
-        WidenedMaps(opened, cube),
-        finest=effort.finest,
-        closed=WidenedMaps(~opened, cube),
+        opened,
+        finest=finest,
+        closed=closed,
         limits=LitCells(samples, scene.requirements.projector),
     )
 

@@ -16,6 +16,7 @@ from solvers.bit_rows import sparse_rows
 from solvers.covers.bounds.reduced_cover import ReducedCover
 from solvers.covers.cover import (
     DEFAULT_BUDGET,
+    CoverSolution,
     MaxCoverageSolution,
     reduced_problem,
     solve_max_coverage,
@@ -267,7 +268,12 @@ def _without_idle(
 
 def fewest_count(cover: CandidateCover) -> int:
     """Return how many candidates `select_fewest` takes, and spend nothing on which."""
-    return len(solve_cover(cover.problem, seed=cover.seed, heaviest=False).selected)
+    return len(fewest_of(cover).selected)
+
+
+def fewest_of(cover: CandidateCover, budget: float = DEFAULT_BUDGET) -> CoverSolution:
+    """Return the fewest candidates that counted work finds, whichever they are."""
+    return solve_cover(cover.problem, seed=cover.seed, budget=budget, heaviest=False)
 
 
 def cover_problem(

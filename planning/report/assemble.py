@@ -7,8 +7,7 @@ from planning.cameras.baselines.baseline_rows import baseline_rows
 from planning.cameras.baselines.seams import SampledSurface
 from planning.model.document.certificates import Certificates
 from planning.model.document.coverage_records import CameraMarginal, ProjectorMarginal
-from planning.model.document.device_records import BaselineRow
-from planning.model.document.input_records import EvaluationRecord
+from planning.model.document.device_records import BaselineRow, EvaluationRecord
 from planning.model.document.ring_records import RingsRecord
 from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch

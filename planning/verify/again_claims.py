@@ -1,7 +1,7 @@
 """Figures of a plan against those that the code which made it gives again."""
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, Literal
 
 from planning.verify.audit.audit_findings import AuditFindings
 
@@ -22,16 +22,16 @@ def compare_again(
     Parts that couldn't be computed are None, and not compared; but where the `whole`
     document came out again, there is nothing that couldn't be.
     """
-    scopes = dict.fromkeys(again, "whole" if whole else "own")
     if whole:
-        scopes |= dict.fromkeys(document, "whole")
+        differing = list(_differing(document, again, "", "whole"))
     else:
-        scopes |= dict.fromkeys(_PARTLY & set(again), "part")
-    differing = [
-        found
-        for key, scope in scopes.items()
-        for found in _differing(document.get(key), again.get(key), key, scope)
-    ]
+        differing = [
+            found
+            for key, part in again.items()
+            for found in _differing(
+                document.get(key), part, key, "part" if key in _PARTLY else "own"
+            )
+        ]
     findings = AuditFindings()
     for key, sentence in differing[:_MOST_TOLD]:
         findings.fail(key, sentence)
@@ -44,19 +44,19 @@ def _differing(
     claimed: Any,  # noqa: ANN401
     made: Any,  # noqa: ANN401
     key: str,
-    scope: str,
+    scope: Literal["whole", "own", "part"],
 ) -> Iterator[tuple[str, str]]:
+    """Yield where two parts differ, with words; what one lacks goes by the scope."""
     if made is None and isinstance(claimed, Mapping) and scope != "whole":
         return
     if isinstance(made, Mapping) and isinstance(claimed, Mapping):
         for name, part in made.items():
-            yield from _differing(
-                claimed.get(name, "nothing"), part, f"{key}.{name}", scope
-            )
-        spared = _ELSEWHERE if scope == "own" else set[str]()
-        for name in set() if scope == "part" else set(claimed) - set(made) - spared:
+            below = f"{key}.{name}".lstrip(".")
+            yield from _differing(claimed.get(name, "nothing"), part, below, scope)
+        lacking = set[str]() if scope == "part" else set(claimed) - set(made)
+        for name in lacking - _ELSEWHERE if scope == "own" else lacking:
             yield (
-                f"{key}.{name}",
+                f"{key}.{name}".lstrip("."),
                 f"claimed {claimed[name]!r}, no such figure comes out",
             )
     elif isinstance(made, list) and isinstance(claimed, list):

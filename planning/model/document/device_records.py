@@ -1,4 +1,4 @@
-"""`projectors`, `cameras` and `baselines` of a plan file."""
+"""`projectors`, `cameras`, `baselines` and `evaluation` of a plan file."""
 
 from typing import Any, Literal, Self
 
@@ -15,6 +15,18 @@ from .ring_records import RingSharesRecord, RingsRecord, are_radii
 
 # Of the pixel that a viewing ray was told of, where it is imaged.
 _SAME_PX = 1.0
+
+Limit = Literal[
+    "standoff",
+    "cone",
+    "floor",
+    "box",
+    "mounting",
+    "keep_out",
+    "range",
+    "body",
+    "clearance",
+]
 
 
 class GreySample(Part):
@@ -262,3 +274,27 @@ class BaselineRow(Part):
     d_max_stated: float | None = None
     d_max_sigma: float | None = None
     covered_at_2_sigma: bool | None = None
+
+
+class ViolationRecord(Part):
+    """A limit of where devices may stand that one of an evaluated rig breaks.
+
+    Attributes:
+        device: Its id.
+        limit: Of its position, of its body, or its range, in which no vertex lies.
+        what: The zone, what the body touches, or `too near` and `too far`.
+        by_m: How far; None: it touches.
+    """
+
+    device: str
+    limit: Limit
+    what: str = ""
+    by_m: float | None
+
+
+class EvaluationRecord(Part):
+    """Where the poses of a rig as it stands are from, and which limits they break."""
+
+    path: str
+    sha256: str
+    violations: tuple[ViolationRecord, ...] = ()

@@ -12,18 +12,6 @@ from planning.model.bodies import Body
 from .head_records import CarrierRecord, HeadRecord, TurntableRecord
 from .part import Interval, Matrix3, Part, Resolution, Vector3
 
-Limit = Literal[
-    "standoff",
-    "cone",
-    "floor",
-    "box",
-    "mounting",
-    "keep_out",
-    "range",
-    "body",
-    "clearance",
-]
-
 
 class Units(Part):
     """Of every figure that doesn't name its own."""
@@ -236,11 +224,10 @@ class RigRecord(Part):
     @model_validator(mode="after")
     def _numbers(self) -> Self:
         margin, floor = self.rings.get("margin_m", 0.0), self.workspace.get("floor_mm")
-        for key, value in (("rings.margin_m", margin), ("workspace.floor_mm", floor)):
-            if not isinstance(value, float | int | None) or (
-                value is None and key.startswith("rings")
-            ):
-                raise ValueError(f"{key} = {value!r} should be a number")
+        if not isinstance(margin, float | int):
+            raise ValueError(f"rings.margin_m = {margin!r} should be a number")
+        if not isinstance(floor, float | int | None):
+            raise ValueError(f"workspace.floor_mm = {floor!r} should be a number")
         return self
 
     def models(self, kind: str) -> tuple[ModelRecord, ...]:
@@ -262,30 +249,6 @@ class RigRecord(Part):
         taken = {self.model_of(kind, name).name for name in names}
         models = self.models(kind)
         return [m.figures for m in models if m.name in taken] or [models[0].figures]
-
-
-class ViolationRecord(Part):
-    """A limit of where devices may stand that one of an evaluated rig breaks.
-
-    Attributes:
-        device: Its id.
-        limit: Of its position, of its body, or its range, in which no vertex lies.
-        what: The zone, what the body touches, or `too near` and `too far`.
-        by_m: How far; None: it touches.
-    """
-
-    device: str
-    limit: Limit
-    what: str = ""
-    by_m: float | None
-
-
-class EvaluationRecord(Part):
-    """Where the poses of a rig as it stands are from, and which limits they break."""
-
-    path: str
-    sha256: str
-    violations: tuple[ViolationRecord, ...] = ()
 
 
 class RangePoint(Part):

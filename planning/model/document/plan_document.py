@@ -18,10 +18,14 @@ from .coverage_records import (
     RegionRecord,
     RobustRecord,
 )
-from .device_records import BaselineRow, CameraRecord, ProjectorRecord
+from .device_records import (
+    BaselineRow,
+    CameraRecord,
+    EvaluationRecord,
+    ProjectorRecord,
+)
 from .family_records import AlignmentRecord, FamilyRecord
 from .input_records import (
-    EvaluationRecord,
     MeshRecord,
     RangesRecord,
     RigRecord,

@@ -12,11 +12,11 @@ import numpy as np
 from planning.model.document.coverage_records import RegionRecord
 from planning.model.words import count_words
 from planning.projectors.candidate_set import CandidateSet
+from planning.proofs.selection import fewest_of
 from planning.report.judged import Devices
 from planning.report.region_claims import RegionSamples
 from planning.rig.rig import Rig
 from planning.scene.measured import lit_samples
-from solvers.covers.cover import solve_cover
 from solvers.status import SolveStatus
 
 from .camera_relaxations import least_demands
@@ -80,9 +80,7 @@ def with_small_floor(
     share = np.floor(_SHARES * share) / _SHARES
     required = replace(scene.requirements, region_share=share)
     asked = replace(candidates, scene=replace(scene, requirements=required))
-    few = solve_cover(
-        asked.cover.problem, seed=scene.seed, budget=_ADVICE, heaviest=False
-    )
+    few = fewest_of(asked.cover, _ADVICE)
     most = "" if few.status is SolveStatus.OPTIMAL else "at most "
     told = (
         f"[requirements] region_share = {share:g} gives it a floor and takes {most}"

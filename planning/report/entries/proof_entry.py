@@ -114,7 +114,7 @@ def _over_poses(frozen: _Frozen, refutation: Refutation | None) -> PoseProof | N
     every = np.zeros(last, dtype=np.int64)
     every[where[:n]] = refutation.multipliers
     proof = PoseProof(draws, faces, refutation.n_devices, every)
-    return proof if proof.n_whole >= proof.least_whole * len(every) else None
+    return proof if proof.is_of_whole_draws else None
 
 
 def _projector_draws() -> Iterable[list[tuple[Draw, int]]]:

@@ -1,6 +1,6 @@
 """What an evaluated rig doesn't keep of where devices may stand, for a person."""
 
-from planning.model.document.input_records import ViolationRecord
+from planning.model.document.device_records import ViolationRecord
 from planning.model.plan import RigPlan
 from planning.model.words import labelled
 

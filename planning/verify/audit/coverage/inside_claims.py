@@ -98,11 +98,10 @@ def _free_share(
     caster = shadow.caster
     begin = points + _ABOVE * caster.mesh.radius * normals
     free = np.zeros(len(points))
-    beyond = np.full(len(points), 4.0 * caster.reach / caster.scale)
     for _ in range(_RAYS):
         # The normal plus a point of the unit sphere follows the cosine law.
         ball = rng.normal(size=normals.shape)
         along = normals + ball / lengths(ball)[:, None]
         along /= np.maximum(lengths(along), 1e-12)[:, None]
-        free += ~caster.occluded(begin, along, beyond)
+        free += ~caster.met(begin, along)
     return free / _RAYS

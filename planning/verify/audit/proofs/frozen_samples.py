@@ -5,6 +5,7 @@ import numpy as np
 from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.sampling import sample_surface
 from geometry.parallel import mapped
+from planning.model.proofs import sizes_of
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_samples import AuditSamples, samples_on
 from planning.verify.audit.predicates.audit_devices import AuditCamera
@@ -69,7 +70,7 @@ def drawn_again(
         and counts.sum() <= _MOST_SAMPLES
         and np.all(draws[:, 1:] >= 0)
         and np.all(draws[:, 2] >= 1)
-        and np.all(-(-counts // np.maximum(draws[:, 2], 1)) >= _FEWEST_SAMPLES)
+        and np.all(sizes_of(draws) >= _FEWEST_SAMPLES)
         and len(np.unique(draws[:, 1])) == len(counts)
     ):
         raise RefutedProofError(

@@ -120,7 +120,7 @@ def _derived(
     if proof.n_devices + 1 + given < table.lower_bound:
         raise RefutedProofError(f"the certificate is of {proof.n_devices + 1 + given}")
     every, n = drawn_again(case, proof.draws, proof.faces), len(proof.multipliers)
-    if n == 0 or proof.n_whole < proof.least_whole * n:
+    if not proof.is_of_whole_draws:
         raise RefutedProofError(
             f"of its {n} samples {proof.n_whole} are of whole draws"
         )
