@@ -3,12 +3,14 @@
 import json
 import shutil
 import sys
+from types import SimpleNamespace
 
 import pytest
 from click.testing import CliRunner
 from support.little_work import work_little
 from support.small_job import RIG
 
+from planning.cache.cache import NO_CACHE
 from planning.cli.checks.planned_again import PlannedAgain
 from planning.cli.declared.asked_again import asked_again
 from planning.cli.main import commands
@@ -142,6 +144,44 @@ def asks(plan, **changes):
 def test_what_can_t_be_planned_again_is_said_in_a_line(plan, changes, why):
     with pytest.raises(InputError, match=f"({why}).*without --replan"):
         asked_again(asks(plan, **changes))
+
+
+def test_no_clock_cuts_it_and_nothing_stays(plan, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    words = [*WORDS.split(), "--time-limit", "9", "-o", "here"]
+    limited = asks(plan, command=["plan", *words])
+    asked = {}
+
+    def planned(options, command, cache, **how):
+        asked.update(options, command=list(command), cache=cache, how=how)
+        plan.save(options["output"] / "plan.json")
+
+    monkeypatch.setattr("planning.cli.checks.planned_again.planned_once", planned)
+    options = asked_again(limited, mesh=tmp_path / "other.obj")
+    again = PlannedAgain(limited, options, quiet=True)
+    assert again(limited, 3) == plan.to_document()
+    assert asked["time_limit"] is None
+    assert (asked["threads"], asked["cache"]) == (3, NO_CACHE)
+    assert (asked["command"], asked["how"]) == (words, {"show": False})
+    assert asked["meshes"] == (str(tmp_path / "other.obj"),)
+    assert not asked["output"].exists()
+    assert not list(tmp_path.iterdir())
+
+
+def test_members_are_held_to_their_own_and_planned_once(plan, monkeypatch):
+    made = []
+
+    def again(_self, _threads):
+        made.append(1)
+        told = [SimpleNamespace(to_document=lambda k=k: {"member": k}) for k in "ab"]
+        return SimpleNamespace(members=told, to_document=lambda: {"member": "all"})
+
+    monkeypatch.setattr(PlannedAgain, "_again", again)
+    family = SimpleNamespace(members=(object(), object(), object()))
+    planned = PlannedAgain(family, {}, quiet=True)
+    told = [planned(one, 1) for one in (family, *family.members)]
+    assert told == [{"member": "all"}, {"member": "a"}, {"member": "b"}, {}]
+    assert made == [1]
 
 
 def test_a_plan_that_doesn_t_say_its_words_exits_3(folder, tmp_path):
