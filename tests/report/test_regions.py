@@ -169,7 +169,7 @@ def test_of_the_largest_dark_region_without_a_floor_one_is_priced(world, monkeyp
     )
     # Where fewer weren't refuted, that so many are enough is all that is said.
     found = SimpleNamespace(status=SolveStatus.FEASIBLE, selected=np.arange(2))
-    monkeypatch.setattr(floor_relaxations, "solve_cover", lambda *_, **__: found)
+    monkeypatch.setattr(floor_relaxations, "fewest_of", lambda *_, **__: found)
     cut = with_small_floor(records, CandidateSet.over(scene, samples, poses))
     assert "takes at most 2 projectors" in cut[3].coverage.relaxations[0]
 
