@@ -221,10 +221,42 @@ def quarters(level: Ints, cells: Ints) -> Ints:
 
 def middles(level: Ints, cells: Ints) -> Array:
     """Return the unit direction of the middle of cells, shape (m, 3)."""
+    return _directions(level, cells, 0.5, 0.5)
+
+
+def circles(level: Ints, cells: Ints) -> tuple[Array, Array]:
+    """Return the middles of cells (m, 3), and the angle about each that holds it, (m,).
+
+    In [rad]; a cell of level k is one of the map of 2^k cells an edge.
+    """
+    middle = middles(level, cells)
+    corners = [_directions(level, cells, j, i) for j in (0, 1) for i in (0, 1)]
+    angles = [angle_between(middle, corner) for corner in corners]
+    return middle, np.max(angles, axis=0) + _ROUNDING
+
+
+def widest(levels: Ints) -> Array:
+    """Return the largest angle of `circles` on each level: of cells in faces' corners.
+
+    There lines cross at 60 degrees, and half the long diagonal is 0.816 of a step where
+    it is 0.707 in the middle of a face.
+    """
+    return circles(levels, np.zeros_like(levels))[1]
+
+
+def _directions(level: Ints, cells: Ints, down: float, across: float) -> Array:
+    """Return unit directions in cells, at shares of their rows and columns, (m, 3)."""
+    n = 1 << level
+    face, rest = np.divmod(cells, n * n)
+    j, i = np.divmod(rest, n)
+    x, y = (
+        np.tan(0.5 * np.pi * ((k + s) / n - 0.5)) for k, s in ((i, across), (j, down))
+    )
+    unit = 1.0 / np.sqrt(1.0 + x * x + y * y)
     directions = np.empty((cells.size, 3))
-    for depth in np.unique(level):
-        some = level == depth
-        directions[some] = CubeMap(1 << int(depth)).centres[cells[some]]
+    of = np.arange(cells.size)
+    for axis, value in zip(_AXES[face].T, (x, y, _SIGNS[face]), strict=True):
+        directions[of, axis] = value * unit
     return directions
 
 

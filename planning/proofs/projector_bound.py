@@ -38,11 +38,12 @@ from .all_poses import BoundQuestion, ContinuousBound, Effort
 _Tree = DirectionTree | PositionTree
 
 DEFAULT = Effort(
-    finest=8, maps=6, budget=3.5e9, shadows=3e8, most_samples=2000, starts=1
+    finest=10, maps=6, budget=3.5e9, shadows=3e8, most_samples=2000, starts=1
 )
-# Share of the work for a search without shadows, where they can be drawn.
-_FIRST = 0.3
-PROVE = Effort(finest=9, maps=7, budget=4e10, shadows=np.inf, offers=150, starts=4)
+# Share of the work for a search without shadows, where they can be drawn, and how many
+# levels rougher its cells are.
+_FIRST, _ROUGHER = 0.3, 2
+PROVE = Effort(finest=11, maps=7, budget=4e10, shadows=np.inf, offers=150, starts=4)
 
 
 def bound_projectors(
@@ -92,8 +93,8 @@ def bound_projectors(
     # Shadows cost most, and what is proved without them holds with them.
     first = effort
     if shadows:
-        maps, budget = max(0, effort.maps - 1), _FIRST * effort.budget
-        first = replace(effort, maps=maps, budget=budget)
+        maps, finest = max(0, effort.maps - 1), max(0, effort.finest - _ROUGHER)
+        first = replace(effort, maps=maps, finest=finest, budget=_FIRST * effort.budget)
     bound, tree = searched(first, shadows=False)
     if shadows and bound.status is not CellStatus.PROVED:
         among = searched(effort, shadows=True)

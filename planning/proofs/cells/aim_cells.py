@@ -17,12 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.directions.cube_map import FACES, CubeMap, quarters
+from geometry.directions.cube_map import FACES, circles, quarters, widest
 from solvers.bit_rows import parts
 
 from .grown_tree import GrownTree
 from .position_cells import PAIRS, PositionTree
-from .shell_cells import directions_of
 
 _ROUNDING = 1e-9
 _EVERY = -1
@@ -41,7 +40,6 @@ class AimTree(GrownTree):
         self, positions: PositionTree, half_angle: float, *, finest: int
     ) -> None:
         self.positions, self._beta, self._finest = positions, half_angle, finest
-        self._cubes = [CubeMap(1 << level) for level in range(finest + 1)]
         place = positions.roots().cells
         every_aim = np.full(place.size, _EVERY), 0 * place
         super().__init__((place, *every_aim), positions.n_rows)
@@ -52,8 +50,9 @@ class AimTree(GrownTree):
         place, level, _ = self.cells(names)
         may_turn = level < self._finest
         # Every aim, named by level -1, is open by pi.
-        widths = np.array([cube.radii.max() for cube in self._cubes] + [np.pi])
-        turning = (widths[level] > self.positions.widths(place)) & may_turn
+        every = level == _EVERY
+        width = np.where(every, np.pi, widest(np.where(every, 0, level)))
+        turning = (width > self.positions.widths(place)) & may_turn
         moved = self._moved(names, np.flatnonzero(~turning))
         # What can't be cut by position any more may still be by aim.
         whole = ~turning & may_turn
@@ -99,7 +98,7 @@ class AimTree(GrownTree):
         covered = may & self.positions.covered(place)
         at, samples = np.nonzero(covered & (level != _EVERY)[:, None])
         # Of cells with every aim nothing is asked.
-        middles, radii = directions_of(self._cubes, np.maximum(level, 0), aim)
+        middles, radii = circles(np.maximum(level, 0), aim)
         cells = self.positions.cells(place)
         facing = self.positions.facing(cells)
         for pairs in parts(at.size, PAIRS):

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.directions.cube_map import FACES, CubeMap, middles
+from geometry.directions.cube_map import FACES, circles, middles, widest
 from geometry.directions.widened_maps import WidenedMaps
 from planning.model.requirements import Workspace
 from planning.scene.workspace.admissible import may_be_admissible
@@ -23,7 +23,7 @@ from solvers.bit_rows import parts
 from .cell_limits import CellLimits
 from .grown_tree import GrownTree
 from .lit_cells import LitCells
-from .shell_cells import Facing, Seen, ShellCells, directions_of, seen_from
+from .shell_cells import Facing, Seen, ShellCells, seen_from
 
 # Pairs of cell and sample looked at together: they stay in the second-level cache.
 PAIRS = 1 << 13
@@ -61,7 +61,6 @@ class PositionTree(GrownTree):
         self._reach = float(np.linalg.norm(self._points, axis=1).max(initial=0.0))
         self._maps, self._closed = maps, closed
         self._finest, self._limits = finest, limits
-        self._cubes = [CubeMap(1 << level) for level in range(finest + 1)]
         whole, (low, high) = np.arange(FACES), radius_m
         faces = ShellCells(0 * whole, whole, np.full(FACES, low), np.full(FACES, high))
         super().__init__(faces, len(points))
@@ -86,10 +85,9 @@ class PositionTree(GrownTree):
     ) -> tuple[NDArray[np.int64], Sequence[NDArray[Any]]]:
         cells = self.cells(names)
         middle = 0.5 * (cells.low_m + cells.high_m)
-        angle = np.array([self._cubes[k].radii.max() for k in cells.level])
         # How much of psi comes from the radii, and how much from the directions.
         along = 0.5 * (cells.high_m - cells.low_m) * self._reach / middle
-        deep = along > cells.high_m * angle
+        deep = along > cells.high_m * widest(cells.level)
         two = np.flatnonzero(deep)
         four = np.flatnonzero(~deep & (cells.level < self._finest))
         finer = cells.take(four).quartered(), cells.take(two).halved()
@@ -127,7 +125,7 @@ class PositionTree(GrownTree):
 
     def facing(self, cells: ShellCells) -> Facing:
         """Return where cells are from the centre, for `seen_from`."""
-        return directions_of(self._cubes, cells.level, cells.cell)
+        return circles(cells.level, cells.cell)
 
     def seen_from(
         self,

@@ -7,14 +7,13 @@ angle about e, h half the interval, so::
     psi = max angle(M - P, M -+ h e - P) + asin(rho / (|M - P| - h))
 """
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.arrays import lengths
-from geometry.directions.cube_map import CubeMap, quarters
+from geometry.directions.cube_map import quarters
 
 _ROUNDING = 1e-9
 # Unit middles of cells (n, 3), and the angle about each that holds it [rad], (n,).
@@ -76,21 +75,6 @@ class Seen(NamedTuple):
     def take(self, chosen: NDArray[np.int64]) -> "Seen":
         """Return the chosen pairs."""
         return Seen(*(column[chosen] for column in self))
-
-
-def directions_of(
-    cubes: Sequence[CubeMap], level: NDArray[np.int64], cell: NDArray[np.int64]
-) -> Facing:
-    """Return unit middles of cells, and the angle about each that holds the cell [rad].
-
-    `cubes` are cube maps of 1, 2, 4, ... cells an edge.
-    """
-    middles, radii = np.empty((cell.size, 3)), np.empty(cell.size)
-    for k in np.unique(level):
-        at = level == k
-        middles[at] = cubes[k].centres[cell[at]]
-        radii[at] = cubes[k].radii[cell[at]]
-    return middles, radii
 
 
 def seen_from(

@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 
 from geometry.directions.cube_cells import mark_segments
-from geometry.directions.cube_map import CubeMap, angle_between
+from geometry.directions.cube_map import (
+    CubeMap,
+    angle_between,
+    circles,
+    located,
+    middles,
+    quarters,
+    widest,
+)
 from geometry.directions.widened_maps import WidenedMaps
 
 
@@ -34,6 +42,22 @@ def test_cells_hold_their_directions(n):
     assert off.max() > 0.9 * cube.radii.max()
     ends = cube.lines[[0, -1]]
     np.testing.assert_allclose(ends, [-1.0, 1.0], atol=1e-12)
+
+
+@pytest.mark.parametrize("level", [0, 1, 5, 20])
+def test_circles_hold_cells_of_any_level_and_none_is_wider_than_the_widest(level):
+    # Of a map of 2^20 cells an edge nothing could be kept.
+    some = directions(20_000)
+    cells, levels = located(some, 1 << level), np.full(len(some), level)
+    centres, radii = circles(levels, cells)
+    assert located(centres, 1 << level).tolist() == cells.tolist()
+    off = angle_between(centres, some)
+    assert np.all(off <= radii)
+    assert np.all(radii <= widest(levels) + 1e-15)
+    assert np.max(off / radii) > 0.95
+    # The middles of its four parts lie within it.
+    for part in quarters(levels, cells).T:
+        assert np.all(angle_between(centres, middles(levels + 1, part)) <= radii)
 
 
 @pytest.mark.parametrize("n", [1, 2, 4, 16, 64])
