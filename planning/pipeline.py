@@ -45,6 +45,7 @@ from .steps.stages import (
     one_device_more,
     placed,
     polished,
+    with_fewer_cameras,
     with_free_axes,
 )
 from .steps.standing import as_they_stand
@@ -291,6 +292,8 @@ def _devices_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPla
         partial = polished(larger, clock)
         yield partial, False
         partial = bounded_cameras(partial, clock)
+        if larger := with_fewer_cameras(partial, clock):
+            continue
         plan = yield partial, True
         assert plan is not None
         larger = with_free_axes(partial, plan, clock)

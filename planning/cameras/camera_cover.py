@@ -136,35 +136,38 @@ def confirmed_cover(
         if cover.selection.status == "infeasible":
             return cover
         fresh = scene.target_samples(DRAWS.fresh_cameras.later(attempt))
-        if _surely_enough(scene, projectors, cover, fresh):
+        chosen = cover.selection.chosen
+        if confirms(scene, projectors, cover.candidates, chosen, fresh):
             return cover
-        lit, seen = measured_of(scene, projectors, cover.candidates, fresh)
-        offered = cover.candidates.cameras
-        if candidate_cover(scene, seen, lit, offered).enough(cover.selection.chosen):
-            return cover
+        _, seen = measured_of(scene, projectors, cover.candidates, fresh)
         target = merged(target, fresh)
         samples = lit_samples(scene, projectors, target)
         measured = np.concatenate([measured, seen[:, : len(candidates.cameras)]])
     return choose(samples, measured)
 
 
-def _surely_enough(
+def confirms(
     scene: Scene,
     projectors: Sequence[PlannedProjector],
-    cover: CameraCover,
-    target: Target,
+    candidates: CandidateViews,
+    chosen: NDArray[np.int64],
+    fresh: Target,
 ) -> bool:
-    """Return whether what is measured is enough, whatever other candidates reach.
+    """Return whether chosen candidates measure enough of samples that are fresh.
 
-    They reach no more than is lit, so most often none has to be looked at.
+    Candidates reach no more than is lit, so most often no other has to be looked at.
     """
+    cameras = tuple(candidates.cameras[i] for i in chosen)
     lit, measured = measured_of(
-        scene, projectors, CandidateViews(scene, cover.cameras), target
+        scene, projectors, CandidateViews(scene, cameras), fresh
     )
     floors = RegionFloors.of(scene, lit.target, "camera")
     reached = np.ones(len(lit.target), dtype=bool)
     quotas = Quotas.of(floors, reached, scene.requirements.coverage)
-    return quotas.enough(np.any(measured, axis=1))
+    if quotas.enough(np.any(measured, axis=1)):
+        return True
+    lit, seen = measured_of(scene, projectors, candidates, fresh)
+    return candidate_cover(scene, seen, lit, candidates.cameras).enough(chosen)
 
 
 def measured_samples(

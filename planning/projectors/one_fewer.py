@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.proofs.quotas import Quotas, RegionFloors
+from planning.proofs.quotas import Quotas, RegionFloors, missed_shares
 from planning.proofs.selection import cover_problem
 from solvers import solve_max_coverage
 
@@ -154,17 +154,6 @@ def _most_lit(
     aims = Quotas.of(regions, reached | lit, share, spare=_AIMED)
     spared = lit.sum() >= (1.0 + _SPARE) * aims.total and aims.enough(lit)
     return best, missing(best)[0], bool(spared) or not regions.share
-
-
-def missed_shares(quotas: Quotas, counts: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Return the shares of quotas that are missed, added up, (k,).
-
-    Of counts of each number of `RegionFloors`, (n_rows, k). Poses that move by an angle
-    win in proportion to what there is, of a region as of all.
-    """
-    wanted = np.append(quotas.floors, quotas.total)[:, None]
-    short = wanted - np.vstack([counts, counts.sum(axis=0)])
-    return np.sum(np.clip(short, 0, None) / np.maximum(wanted, 1), axis=0)
 
 
 def _swapped(

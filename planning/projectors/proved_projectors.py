@@ -13,6 +13,7 @@ from planning.proofs.all_poses import (
     joined,
     with_existing_alone,
 )
+from planning.proofs.moved_poses import free_devices
 from planning.proofs.projector_bound import bound_projectors
 from planning.proofs.quotas import RegionFloors
 from planning.proofs.selection import fewest_count, select_fewest
@@ -24,7 +25,7 @@ from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
 from .candidate_set import CandidateSource
-from .free_poses import free_poses
+from .free_poses import ProjectorOffer
 from .projector_stage import ProjectorStage
 
 
@@ -66,7 +67,8 @@ def _better(
     count = stage.certificate.needed.count
     if better is not stage or bound.proof().lower_bound >= count:
         return better
-    found = free_poses(source, stage.candidates, count - 1, effort.starts)
+    offer = ProjectorOffer(source, stage.candidates)
+    found = free_devices(offer, count - 1, effort.starts)
     return _with_more(stage, found) if found else stage
 
 

@@ -39,11 +39,17 @@ from .all_poses import BoundQuestion, ContinuousBound, Effort
 # Levels by which cells without shadows are rougher than those among them.
 _ROUGHER = 2
 DEFAULT = Effort(
-    finest=8, aims=None, maps=5, budget=2.5e9, shadows=3e8, most_samples=2000
+    finest=8,
+    aims=None,
+    maps=5,
+    budget=2.5e9,
+    shadows=3e8,
+    most_samples=2000,
+    starts=1,
 )
 # Of what is asked only to spare a search: rough cells, no shadows.
 ROUGH = replace(DEFAULT, shadows=0.0, budget=1.2e9)
-PROVE = Effort(finest=9, aims=5, maps=7, budget=3e10, shadows=np.inf)
+PROVE = Effort(finest=9, aims=5, maps=7, budget=3e10, shadows=np.inf, starts=4)
 
 
 def bound_cameras(

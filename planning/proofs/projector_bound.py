@@ -38,7 +38,7 @@ from .all_poses import BoundQuestion, ContinuousBound, Effort
 _Tree = DirectionTree | PositionTree
 
 DEFAULT = Effort(
-    finest=10, maps=6, budget=3.5e9, shadows=3e8, most_samples=2000, starts=1
+    finest=8, maps=6, budget=3.5e9, shadows=3e8, most_samples=2000, starts=1
 )
 # Share of the work for a search without shadows, where they can be drawn, and how many
 # levels rougher its cells are.

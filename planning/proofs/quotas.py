@@ -119,3 +119,14 @@ class Quotas:
 def required_samples(reached: _Mask, share: float) -> int:
     """Return how many samples a share of those that any candidate covers is."""
     return int(np.ceil(share * int(reached.sum()) - 1e-9))
+
+
+def missed_shares(quotas: Quotas, counts: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the shares of quotas that are missed, added up, (k,).
+
+    Of counts of each number of `RegionFloors`, (n_rows, k). Poses that move by an angle
+    win in proportion to what there is, of a region as of all.
+    """
+    wanted = np.append(quotas.floors, quotas.total)[:, None]
+    short = wanted - np.vstack([counts, counts.sum(axis=0)])
+    return np.sum(np.clip(short, 0, None) / np.maximum(wanted, 1), axis=0)

@@ -11,6 +11,7 @@ from planning.cameras.camera_cover import (
 )
 from planning.cameras.camera_routes import Widened, cheapest, widest_routes
 from planning.cameras.camera_stage import CameraSolution, follow_cameras
+from planning.cameras.free_cameras import has_room, one_camera_fewer
 from planning.cameras.kept_pairs import rings_for_pairs
 from planning.cameras.proved_cameras import CameraStage, bound_stage
 from planning.model.document.certificates import Certificate
@@ -216,6 +217,31 @@ def bounded_cameras(partial: PartialPlan, clock: Stopwatch) -> PartialPlan:
         stage = bound_stage(partial.scene, stage, request.rig.optics[1], effort)
         clock.say(f"  cameras: {_bound_words(stage.certificate)}")
     return replace(partial, camera_stage=stage)
+
+
+def with_fewer_cameras(partial: PartialPlan, clock: Stopwatch) -> PartialPlan | None:
+    """One camera fewer, where any is found between the bound and the count; else None.
+
+    The paper's route stays what it is, where it was asked for, and so do cameras that
+    survive losses.
+    """
+    request, stage = partial.request, partial.camera_stage
+    if request.cameras_by == "paper" or partial.surviving is not None:
+        return None
+    if not has_room(stage):
+        return None
+    effort = camera_bound.PROVE if request.prove else camera_bound.DEFAULT
+    with clock.stage("cameras", "cameras: one fewer, between the bound and the count"):
+        fewer = one_camera_fewer(
+            partial.scene.among(partial.projectors),
+            partial.projectors,
+            stage,
+            effort.starts,
+        )
+    if fewer is None:
+        return None
+    _say_count(fewer, fewer.cameras, clock)
+    return replace(partial, camera_stage=fewer, cameras=fewer.cameras, rings=None)
 
 
 def with_free_axes(

@@ -13,9 +13,9 @@ from support.factories import make_projector, make_requirements, make_scene
 
 from geometry.shapes.primitives import sphere
 from planning.projectors.candidate_set import CandidateSet, CandidateSource
-from planning.projectors.one_fewer import _swapped, missed_shares, one_fewer
+from planning.projectors.one_fewer import _swapped, one_fewer
 from planning.projectors.share_margin import margin_at_share, widest_between
-from planning.proofs.quotas import Quotas, RegionFloors
+from planning.proofs.quotas import Quotas, RegionFloors, missed_shares
 from planning.proofs.selection import select_fewest
 from planning.rig.rig import load_rig
 from planning.rings.ring_radii import uniform_radii

@@ -1,0 +1,195 @@
+"""One device fewer from poses anywhere in the workspace, one moved at a time.
+
+Where the bound over all poses is below the count, either the bound is weak or free
+poses need one fewer. Each pose in turn goes to the best of those around it, given what
+the others cover, from less and less far, until none is better. A cover so found is
+fitted to its samples, so fresh ones must confirm it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Generic, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planning.model.planned import PlannedCamera, PlannedProjector
+from solvers import solve_max_coverage
+
+from .quotas import Quotas, RegionFloors, missed_shares
+from .selection import CandidateCover
+
+_D = TypeVar("_D", PlannedProjector, PlannedCamera)
+_Mask = NDArray[np.bool_]
+
+# How far poses are offered around one, in spacings of a lattice of so many; from the
+# first on each is so much nearer, where no pose moved, until the last.
+_N_LATTICE = 600
+_FARTHEST, _NEARER, _NEAREST = 2.0, 0.6, 0.04
+# What is missing after moves from afar, in shares of what is required, with which
+# nearer ones are given up: they have been seen to win a third of it.
+_FAR, _HOPELESS = 0.5, 0.03
+# By how much more than is required is looked for, so that fresh samples confirm it.
+_SPARE = 0.02
+# Known poses that are looked at in the place of one: those that cover most of the rest.
+_KNOWN = 10
+# Counted work of choosing where a search begins.
+_BUDGET = 1e8
+# Draws of fresh samples that no other search comes to.
+_FIRST_DRAW = 30
+
+
+class Offer(Protocol[_D]):
+    """Devices of a kind: which are known, and what any cover."""
+
+    @property
+    def known(self) -> tuple[_D, ...]:
+        """Candidates; existing devices are the first."""
+        ...
+
+    @property
+    def cover(self) -> CandidateCover:
+        """What they cover, and a share of it that is required."""
+        ...
+
+    def around(self, device: _D, n_lattice: int, scale: float) -> tuple[_D, ...]:
+        """Return others around one, as far out as is that share of a lattice's step."""
+        ...
+
+    def covers(self, devices: Sequence[_D], samples: NDArray[np.int64]) -> _Mask:
+        """Return which of some samples (row) each device (column) covers."""
+        ...
+
+    def confirms(self, devices: tuple[_D, ...], draw: int) -> bool:
+        """Return whether devices cover what is required of a draw of fresh samples."""
+        ...
+
+
+def free_devices(offer: Offer[_D], n_devices: int, starts: int) -> tuple[_D, ...]:
+    """Return poses that, with existing ones, cover what is required; () if none do.
+
+    Args:
+        offer: Known poses, and what gives others.
+        n_devices: One fewer than of these are needed.
+        starts: Searches; each but the first begins where the best so far ended, with
+            one of its poses anywhere.
+    """
+    cover = offer.cover
+    if not starts or n_devices <= cover.n_existing:
+        return ()
+    rng = np.random.default_rng([cover.seed, n_devices])
+    moves = _Moves(offer, cover, rng)
+    chosen = solve_max_coverage(
+        cover.problem, n_devices, seed=cover.seed, budget=_BUDGET
+    ).selected
+    if len(chosen) < n_devices:
+        return ()
+    best, found = moves.moved(_Poses.of(offer, cover, chosen))
+    for _ in range(1, starts):
+        if found or moves.missed(best.covered) > _HOPELESS:
+            break
+        other = int(rng.integers(cover.n_existing, len(offer.known)))
+        i = int(rng.integers(cover.n_existing, n_devices))
+        kicked = best.with_pose(i, offer.known[other], cover.covers[:, other])
+        poses, found = moves.moved(kicked)
+        if moves.missed(poses.covered) <= moves.missed(best.covered):
+            best = poses
+    return best.devices[cover.n_existing :] if found else ()
+
+
+@dataclass(frozen=True, eq=False)
+class _Poses(Generic[_D]):
+    """Devices, and which of the samples each covers, (n, k)."""
+
+    devices: tuple[_D, ...]
+    covers: _Mask
+
+    @classmethod
+    def of(
+        cls, offer: Offer[_D], cover: CandidateCover, chosen: NDArray[np.int64]
+    ) -> "_Poses[_D]":
+        known = offer.known
+        return cls(tuple(known[i] for i in chosen), cover.covers[:, chosen])
+
+    @property
+    def covered(self) -> _Mask:
+        return np.any(self.covers, axis=1)
+
+    def with_pose(self, i: int, device: _D, covers: _Mask) -> "_Poses[_D]":
+        devices, columns = list(self.devices), self.covers.copy()
+        devices[i], columns[:, i] = device, covers
+        return _Poses(tuple(devices), columns)
+
+
+@dataclass(frozen=True, eq=False)
+class _Moves(Generic[_D]):
+    """Moves poses one at a time.
+
+    `rng` says in which order poses move, and how far off others are offered.
+    """
+
+    offer: Offer[_D]
+    cover: CandidateCover
+    rng: np.random.Generator
+
+    def moved(self, poses: _Poses[_D]) -> tuple[_Poses[_D], bool]:
+        """Return poses where none is better near by, and if fresh samples agree."""
+        scale, attempt = _FARTHEST, 0
+        while scale > _NEAREST:
+            before = self.missed(poses.covered, _SPARE)
+            for i in self.rng.permutation(len(poses.devices)):
+                if i >= self.cover.n_existing:
+                    poses = self._better(poses, int(i), scale)
+            missed = self.missed(poses.covered, _SPARE)
+            if 0.0 < missed < before:
+                continue
+            scale, short = scale * _NEARER, self.missed(poses.covered)
+            if short <= 0.0:
+                attempt += 1
+                if self.offer.confirms(poses.devices, _FIRST_DRAW + attempt):
+                    return poses, True
+            elif scale < _FAR and short > _HOPELESS:
+                break
+        return poses, False
+
+    def _better(self, poses: _Poses[_D], i: int, scale: float) -> _Poses[_D]:
+        """Return the poses with one of them where it leaves least to be covered.
+
+        Around where it is, or where one of the best known poses is.
+        """
+        offer, known = self.offer, self.cover.covers
+        around = offer.around(
+            poses.devices[i], _N_LATTICE, scale * self.rng.uniform(0.5, 1.0)
+        )
+        if not around:
+            return poses
+        rest = np.any(np.delete(poses.covers, i, axis=1), axis=1)
+        open_ = np.flatnonzero(~rest)
+        most = np.argsort(-known[open_].sum(axis=0), kind="stable")[:_KNOWN]
+        offered = [*around, *(offer.known[k] for k in most)]
+        covers = np.hstack([offer.covers(around, open_), known[open_][:, most]])
+        missed = []
+        for column in covers.T:
+            covered = rest.copy()
+            covered[open_[column]] = True
+            missed.append(self.missed(covered, _SPARE))
+        best = int(np.argmin(missed))
+        if missed[best] >= self.missed(poses.covered, _SPARE):
+            return poses
+        every = np.arange(len(rest))
+        return poses.with_pose(
+            i, offered[best], offer.covers((offered[best],), every)[:, 0]
+        )
+
+    def missed(self, covered: _Mask, spare: float = 0.0) -> float:
+        """Return the share of what is required, and a little more, that isn't covered.
+
+        What poses cover beside the known ones is required, too.
+        """
+        cover = self.cover
+        regions = cover.regions or RegionFloors.none(len(covered))
+        reached = np.any(cover.covers, axis=1) | covered
+        quotas = Quotas.of(regions, reached, cover.share)
+        quotas = replace(quotas, total=int(np.ceil((1.0 + spare) * quotas.total)))
+        counts = quotas.regions.counts(covered)[:, None]
+        return float(missed_shares(quotas, counts)[0])

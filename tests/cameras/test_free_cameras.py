@@ -1,0 +1,139 @@
+"""Cameras moved one at a time find what few candidates miss."""
+
+from dataclasses import replace
+
+import numpy as np
+from support.factories import make_requirements, make_scene
+from support.little_work import work_little
+
+from geometry.poses import look_at
+from geometry.shapes.primitives import sphere
+from planning import plan_rig
+from planning.cameras.camera_cover import camera_candidate_views, plan_cameras
+from planning.cameras.free_cameras import CameraOffer, has_room, one_camera_fewer
+from planning.cameras.proved_cameras import bound_stage, camera_stage
+from planning.model.bodies import Existing
+from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.proofs import camera_bound
+from planning.proofs.all_poses import Effort
+from planning.proofs.moved_poses import free_devices
+from planning.rig.rig import Rig, load_rig
+from planning.scene.draws import DRAWS
+from planning.scene.lights import ring_frame
+from planning.scene.measured import lit_samples, measured_by
+from planning.scene.workspace.candidates import aimed_poses
+from planning.verify.audit.audit import audit_plan
+
+UP = np.array([0.0, 0.0, 1.0])
+BALL = sphere(0.1, subdivisions=3)
+EFFORT = Effort(finest=6, aims=4, maps=5, budget=1e9, shadows=np.inf)
+
+
+def projector_at(position, tilt):
+    device = load_rig("default").projector_device()
+    pose = aimed_poses(np.array([position]), np.zeros(3), UP, device)[0]
+    ring, radii = ring_frame(pose, device, 0.14, tilt), np.linspace(0.002, 0.4, 200)
+    return PlannedProjector("", "diverging", pose, ring, device, radii)
+
+
+PROJECTORS = (
+    projector_at((0.3, -1.0, 0.4), 1.0),
+    projector_at((-0.6, 0.2, 0.9), 3.0),
+)
+
+
+def staged(n_candidates, *, existing=(), share=0.97):
+    """The fewest of so few candidates for two projectors, and their bound."""
+    required = make_requirements(
+        BALL, load_rig("default"), max_projectors=9, coverage=share
+    )
+    limits = replace(required.triangulation, min_ring_pitch_px=None)
+    required = replace(required, triangulation=limits, existing=tuple(existing))
+    scene = make_scene(BALL, required)
+    camera = PlannedCamera("", np.eye(4), load_rig("default").camera_device())
+    views = camera_candidate_views(scene, (camera,), n_candidates)
+    stage = camera_stage(scene, plan_cameras(scene, PROJECTORS, views))
+    return scene, bound_stage(scene, stage, (camera.device,), EFFORT)
+
+
+def test_two_cameras_measure_what_takes_three_of_forty_candidates():
+    """Two projectors light less than two cameras see: they must stand in between."""
+    scene, stage = staged(40)
+    assert stage.certificate.needed.count == 3
+    assert stage.certificate.continuous.lower_bound == 2
+    fewer = one_camera_fewer(scene, PROJECTORS, stage, starts=1)
+    needed = fewer.certificate.needed
+    assert (needed.count, needed.lower_bound) == (2, 2)
+    assert fewer.certificate.status == "optimal"
+    assert fewer.routes.cover == 2
+    # Samples that neither the search nor what confirmed it has seen.
+    fresh = lit_samples(
+        scene, PROJECTORS, scene.target_samples(DRAWS.fresh_cameras.later(90))
+    )
+    measured = measured_by(scene, fewer.cameras, fresh).any(axis=1)
+    assert measured.mean() > 0.96
+    again = one_camera_fewer(scene, PROJECTORS, stage, starts=1)
+    for one, other in zip(fewer.cameras, again.cameras, strict=True):
+        np.testing.assert_array_equal(one.world_from_device, other.world_from_device)
+
+
+def test_where_the_bound_is_the_count_no_camera_is_looked_for():
+    _, stage = staged(40)
+    assert has_room(stage)
+    proof = stage.certificate
+    bound = proof.continuous.changed(lower_bound=proof.needed.count)
+    assert not has_room(replace(stage, certificate=proof.changed(continuous=bound)))
+    assert not has_room(replace(stage, certificate=proof.changed(continuous=None)))
+
+
+def test_cameras_that_stand_already_stay():
+    pose = look_at(np.array((0.2, -0.9, 0.6)), np.zeros(3), UP)
+    old = Existing("old", "camera", tuple(tuple(row) for row in pose.tolist()))
+    scene, stage = staged(12, existing=[old])
+    count = stage.certificate.needed.count
+    assert has_room(stage)
+    fewer = one_camera_fewer(scene, PROJECTORS, stage, starts=1)
+    assert fewer.certificate.needed.count < count
+    assert fewer.certificate.given == 1
+    np.testing.assert_array_equal(fewer.cameras[0].world_from_device, pose)
+
+
+def test_what_fresh_samples_deny_is_not_taken(monkeypatch):
+    scene, stage = staged(40)
+    offer, asked = CameraOffer(scene, PROJECTORS, stage.cover), []
+
+    def denied(_, devices, draw):
+        asked.append((len(devices), draw))
+        return False
+
+    monkeypatch.setattr(CameraOffer, "confirms", denied)
+    assert free_devices(offer, 2, 1) == ()
+    assert len({draw for _, draw in asked}) == len(asked) > 1
+
+
+def test_a_plan_takes_fewer_cameras_than_its_candidates_need(monkeypatch):
+    """Its poses join the candidates, over which the count is proved and audited."""
+    work_little(monkeypatch, every_pose=True)
+    monkeypatch.setattr(Rig, "n_projector_poses", 160)
+    monkeypatch.setattr(Rig, "n_camera_poses", 14)
+    effort, proofs = camera_bound.DEFAULT, []
+    for starts in (0, 1):
+        monkeypatch.setattr(camera_bound, "DEFAULT", replace(effort, starts=starts))
+        plan = plan_rig(
+            sphere(0.1, subdivisions=2),
+            load_rig("default"),
+            max_projectors=8,
+            target="surface",
+            dominant_coverage=0.6,
+            cameras_by="cover",
+            check=False,
+            on_miss="return",
+        )
+        proof = plan.document.certificates.cameras
+        assert len(plan.cameras) == proof.needed.count == proof.candidates.lower_bound
+        assert audit_plan(plan).failures == ()
+        proofs.append(proof)
+    without, with_ = proofs
+    assert with_.needed.count < without.needed.count
+    assert with_.candidates.n_candidates > without.candidates.n_candidates == 14
+    assert "one moved at a time" in with_.routes.why
