@@ -108,6 +108,19 @@ def test_fewer_cameras_are_proved_too_few_with_rings_as_written(short):
     assert found(short, again=None).failures == ()
 
 
+def test_why_cameras_reach_too_little_comes_out_again(short):
+    honest = found(short)
+    assert honest.failures == ()
+    assert any("min_reachable" in line for line in honest.unmet)
+
+    def another(document):
+        causes = document["coverage"]["unmeasurable_by_cause"]
+        causes[next(iter(causes))] *= 1.0 + 1e-9
+
+    (failure,) = found(forged(short, another)).failures
+    assert "unmeasurable_by_cause" in failure
+
+
 def test_made_with_something_else_claims_are_held_within_tolerances(plan):
     made = MadeWith.here().to_document()
     made["libraries"]["numpy"] = "1.0"
