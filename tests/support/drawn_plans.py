@@ -19,13 +19,20 @@ from planning.model.errors import PlanningError
 from planning.model.plan import RigPlan
 from planning.report.made_again import again_or_why_not
 from planning.rig.rig import Rig
+from planning.scene.draws import DRAWS
 from planning.verify.verification import Verification, verify_plan
 from support.drawn_jobs import Job
-from support.little_work import bound_roughly, work_least, work_little
+from support.little_work import (
+    bound_roughly,
+    draw_fewer,
+    work_least,
+    work_little,
+)
 
 # A plan of little work that takes longer hangs.
 _LONGEST_S = 400
 _INTERRUPTED = 130
+_AXES = DRAWS.axes.count
 
 
 def outcome(job: Job, folder: Path) -> str:
@@ -103,6 +110,8 @@ def _working_little(job: Job) -> Generator[None]:
         else:
             work_least(patch)
             bound_roughly(patch)
+            # How far light reaches is held to a twentieth: few samples don't tell.
+            draw_fewer(patch, axes=_AXES)
             patch.setattr(Rig, "n_projector_poses", 80)
             patch.setattr(Rig, "n_camera_poses", 60)
         # A run that was cut ends itself, not this process.
