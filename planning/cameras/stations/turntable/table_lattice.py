@@ -100,10 +100,11 @@ class TableLattice:
             InfeasibleLimitsError: If it leaves none to projectors, or to cameras.
         """
         empty = cls(table, space, (), ())
-        lights = [d for t in projectors for d in empty.circles(t)]
-        views = [d for t in cameras for d in empty.circles(t)]
-        lamps, eyes = (
-            tuple(d for d in some if empty.room(d).any()) for some in (lights, views)
+        lamps = tuple(
+            d for t in projectors for d in empty.circles(t) if empty.room(d).any()
+        )
+        eyes = tuple(
+            d for t in cameras for d in empty.circles(t) if empty.room(d).any()
         )
         for kind, left in (("projector", lamps), ("camera", eyes)):
             if not left:
