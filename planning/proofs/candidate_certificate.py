@@ -195,7 +195,8 @@ def larger(stage: _S, present: Sequence[object], allowed: int | None) -> _S | No
 def counted(stage: _S, devices: tuple[Any, ...], reachable_m2: float) -> _S:
     """Return a stage with other devices that stand, as many as its cover or more.
 
-    Of more than the cover has nothing is proved: they cover what is reachable at most.
+    Of more than the cover has nothing is proved: they cover what is reachable at most,
+    or what fewer were found to cover where that, of other samples, is more.
     """
     before, count = stage.certificate, len(devices)
     if count == before.count:
@@ -203,6 +204,7 @@ def counted(stage: _S, devices: tuple[Any, ...], reachable_m2: float) -> _S:
     kept = {n: some for n, some in stage.by_count.items() if n <= before.count}
     rows = tuple(row for row in before.by_count if row.count <= before.count)
     found = max((row.value_m2 for row in rows), default=0.0)
+    reachable_m2 = max(reachable_m2, found)
     fewer = OneFewer(upper_bound_m2=reachable_m2)
     if count - 1 == before.count and rows:
         fewer = OneFewer(upper_bound_m2=rows[-1].upper_bound_m2)

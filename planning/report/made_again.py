@@ -15,12 +15,18 @@ from geometry.regions.regions import DominantRegions, dominant_regions
 from geometry.regions.selected_regions import regions_of_faces
 from planning.cameras.baselines.baseline_rows import baseline_rows
 from planning.cameras.baselines.seams import SampledSurface, overlap_components
-from planning.model.document.coverage_records import CameraMarginal, ProjectorMarginal
+from planning.model.document.coverage_records import (
+    CameraMarginal,
+    Coverage,
+    ProjectorMarginal,
+)
 from planning.model.document.part import Part
 from planning.model.plan import RigPlan
 from planning.rings.written_rings import evenly_ringed
 from planning.scene.scene import Scene
 
+from .advice.camera_relaxations import unmeasurable_by_cause
+from .advice.what_helps import cameras_reach_too_little
 from .claims import Claims, make_claims, tau_m
 from .entries import device_entries as entries
 from .entries.overlaps import overlap_records
@@ -66,7 +72,7 @@ def made_again(plan: RigPlan, *, threads: int) -> dict[str, Any]:
     field = principal_curvatures(scene.mesh)
     regions = _regions(plan, field)
     parts: dict[str, Any] = {
-        "coverage": claims.coverage,
+        "coverage": _coverage(plan, scene, devices, claims),
         "regions": entries.region_records(scene.mesh, regions, claims),
         "projectors": entries.projector_records(
             among, devices, known if len(known) == len(rings) else None, claims
@@ -105,6 +111,19 @@ def made_again(plan: RigPlan, *, threads: int) -> dict[str, Any]:
     mesh = entries.mesh_record(scene.mesh, scene.shell).to_document()
     parts["meshes"] = [{name: mesh[name] for name in ("area_m2", "shell")}]
     return {key: _plain(part) for key, part in parts.items()}
+
+
+def _coverage(
+    plan: RigPlan, scene: Scene, devices: Devices, claims: Claims
+) -> Coverage:
+    """The claims' coverage, with why cameras reach too little where a plan says so."""
+    coverage = claims.coverage
+    if plan.document.truncated or not cameras_reach_too_little(
+        plan.requirements, coverage
+    ):
+        return coverage
+    causes = unmeasurable_by_cause(scene, devices, claims)
+    return coverage.changed(unmeasurable_by_cause=causes)
 
 
 def _regions(plan: RigPlan, field: CurvatureField) -> DominantRegions:

@@ -142,9 +142,8 @@ class JointProblem:
         """Return which samples pairs of chosen devices measure, shape (n_e,)."""
         p = set_names("projectors", projectors, self.n_projectors)
         c = set_names("cameras", cameras, self.n_cameras)
-        return self.measured_by_rows(
-            self._bits[np.ix_(p, c)].reshape(p.size * c.size, -1)
-        )
+        bits = self._bits[np.ix_(p, c)]
+        return self.measured_by_rows(bits.reshape(p.size * c.size, bits.shape[2]))
 
     def measured_by_rows(self, rows: NDArray[np.uint64]) -> _Mask:
         """Return which samples any of some bit rows holds, shape (n_e,)."""

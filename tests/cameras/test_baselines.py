@@ -332,6 +332,16 @@ def test_groups_of_parts_that_can_be_registered():
     assert overlap_components(measured[:, :1]) == [[0]]
 
 
+def test_two_cameras_at_one_place_have_no_baseline():
+    points, normals = _wall()
+    pair = [_camera(name, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)) for name in ("C1", "C2")]
+    pair += [_camera("C3", (0.1, 0.0, 1.0), (0.1, 0.0, 0.0))]
+    seen = np.stack([_in_image(camera, points) for camera in pair], axis=1)
+    rows = baseline_rows(pair, SampledSurface(points, normals), seen, THETA)
+    named = {frozenset(row.cameras) for row in rows}
+    assert named == {frozenset(("C1", "C3")), frozenset(("C2", "C3"))}
+
+
 def test_nothing_measured_gives_no_rows():
     points, normals = _wall(50)
     cameras = _facing(0.6)

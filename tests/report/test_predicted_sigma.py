@@ -136,6 +136,16 @@ def test_no_prediction_of_what_is_measured_is_found(failures):
     assert "null, but the target is measured" in failures(change)[0]
 
 
+def test_of_nothing_measured_there_is_no_prediction(failures):
+    """Fresh samples may yet meet a trace: how much, is the area's to say."""
+
+    def change(document):
+        document["coverage"]["sigma"] = None
+        document["coverage"]["target"]["measured_m2"] = 0.0
+
+    assert not any("sigma" in line for line in failures(change))
+
+
 def test_noise_and_calibration_are_told_apart(plan):
     sigma = plan.coverage.sigma
     alone, whole = (line for line in coverage_lines(plan) if "median" in line)

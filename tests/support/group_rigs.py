@@ -13,7 +13,7 @@ from planning.rig.rig import Rig
 
 _LENS: dict[str, Any] = {"resolution_px": [800, 600], "focal_px": [1200.0, 1200.0]}
 _SHARP = {"range_mm": [300.0, 1500.0]}
-_HEAD: dict[str, Any] = {
+HEAD: dict[str, Any] = {
     "name": "twin",
     "working_mm": 600.0,
     "near_mm": 450.0,
@@ -40,7 +40,7 @@ _TABLE = {"point_mm": [0.0, 0.0, 0.0], "axis": [0.0, 0.0, 1.0], "steps": 8}
 
 def head_rig(*, head: dict[str, Any] | None = None, **tables: Any) -> Rig:
     """A rig with one head of a projector between two cameras."""
-    written = copy.deepcopy(DEVICES | {"name": "heads", "head": _HEAD}) | tables
+    written = copy.deepcopy(DEVICES | {"name": "heads", "head": HEAD}) | tables
     written["head"] |= head or {}
     return load_rig(written)
 

@@ -362,6 +362,15 @@ def test_too_few_devices_are_told_with_the_angles(few):
         planned(rig, max_projectors=1, max_cameras=1)
 
 
+def test_a_plane_that_no_circle_meets_is_told_in_one_line(few):
+    wall = {"name": "wall", "centre_mm": [0, -620, 0], "normal": [0, 1, 0]}
+    wall |= {"extent_mm": [900, 900], "thickness_mm": 1}
+    rig = table_rig(workspace={"mounting": [wall]})
+    with pytest.raises(InfeasibleLimitsError, match="left to a projector") as error:
+        planned(rig, max_projectors=1)
+    assert "\n" not in str(error.value)
+
+
 @pytest.mark.parametrize(
     ("tables", "asked", "told"),
     [

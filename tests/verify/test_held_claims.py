@@ -42,6 +42,18 @@ def plan(folder):
     return RigPlan.load(folder / "plan" / "plan.json")
 
 
+@pytest.fixture(scope="module")
+def short(tmp_path_factory):
+    """A plan whose cameras are asked for more than any pose measures."""
+    folder = tmp_path_factory.mktemp("short")
+    write_sample(folder / "head.obj", n_faces=900)
+    words = ["--accuracy", "0.05", "--min-reachable", "1"]
+    ended = run(folder / "head.obj", folder, words)
+    assert ended.code == 1
+    assert ended.plan["coverage"]["unmeasurable_by_cause"]
+    return RigPlan.load(folder / "plan" / "plan.json")
+
+
 def forged(plan, change):
     """A changed copy whose digests are made anew."""
     document = plan.to_document()
@@ -89,6 +101,24 @@ def test_a_billionth_shows_where_the_audit_alone_cannot_tell(plan, place, key):
     (failure,) = found(edited).failures
     assert failure.split(":")[0].endswith(key)
     assert "the same computation again gives" in failure
+
+
+def test_fewer_cameras_are_proved_too_few_with_rings_as_written(short):
+    """Finer rings than those that were covered for let candidates reach less."""
+    assert found(short, again=None).failures == ()
+
+
+def test_why_cameras_reach_too_little_comes_out_again(short):
+    honest = found(short)
+    assert honest.failures == ()
+    assert any("min_reachable" in line for line in honest.unmet)
+
+    def another(document):
+        causes = document["coverage"]["unmeasurable_by_cause"]
+        causes[next(iter(causes))] *= 1.0 + 1e-9
+
+    (failure,) = found(forged(short, another)).failures
+    assert "unmeasurable_by_cause" in failure
 
 
 def test_made_with_something_else_claims_are_held_within_tolerances(plan):

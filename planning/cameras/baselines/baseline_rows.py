@@ -24,6 +24,8 @@ _Array = NDArray[np.float64]
 # Normals that turn less from one sample to the next are one smooth surface.
 _CREASE_COSINE = np.cos(np.radians(30.0))
 _SCAN = 128
+# Optical centres that are nearer have no plane with E [m].
+_ONE_PLACE = 1e-6
 _BISECTIONS = 45
 
 
@@ -64,6 +66,7 @@ def baseline_rows(
 ) -> list[BaselineRow]:
     """Return one row for each order of each neighbouring pair of cameras.
 
+    Two at one place, which may be of different models, have no baseline, and no row.
     `docs/method/baselines.md` defines every key.
     """
     rows: list[BaselineRow] = []
@@ -71,12 +74,18 @@ def baseline_rows(
         (i, j)
         for i, j in neighbouring_pairs(measured_by, surface)
         if meet(cameras[i].station, cameras[j].station)
+        and _are_apart(cameras[i], cameras[j])
     ]
     for seam in find_seams(both_orders(pairs), surface, measured_by):
         pair = [cameras[index] for index in seam.cameras]
         test = check_seam(pair, surface, seam, camera_max_incidence)
         rows.append(_row(pair, test, camera_max_incidence))
     return rows
+
+
+def _are_apart(one: PlannedCamera, two: PlannedCamera) -> bool:
+    apart = one.world_from_device[:3, 3] - two.world_from_device[:3, 3]
+    return bool(np.linalg.norm(apart) > _ONE_PLACE)
 
 
 def check_seam(

@@ -53,16 +53,12 @@ def out_of_reach(
         The area by the limit at which samples come furthest [m²]; and relaxations with
         their share of what is lit, least gain first.
     """
-    among = scene.among(devices.projectors)
-    target, required = claims.target_samples, scene.requirements
-    planned = scene.among((*devices.projectors, *devices.cameras))
-    lit = np.any(lit_stages(planned, devices.projectors, target) == LIT, axis=1)
-    missed = target.take(lit & ~claims.measured_by.any(axis=1))
-    samples = lit_samples(planned, devices.projectors, missed)
+    among, required = scene.among(devices.projectors), scene.requirements
+    samples, n_lit = _missed(scene, devices, claims)
     relaxations = relaxations_of_cameras(rig, required)
     asked = least_demands(among, devices.reference_cameras, samples, relaxations)
     out = asked.furthest < MEASURED
-    share = Share(int(lit.sum()), int(lit.sum() - out.sum()), required.min_reachable)
+    share = Share(n_lit, n_lit - int(out.sum()), required.min_reachable)
     changes = least_changes(relaxations, asked.demanded[:, out], share.wanted)
     unmeasured = taken(samples, np.flatnonzero(out), samples.lit)
     for moved, rest in among.less_one_obstacle():
@@ -76,13 +72,38 @@ def out_of_reach(
         there = scene.candidates(models, whole)
         anywhere = there.over(required.workspace.n_reference_cameras)
         changes[change] = int(measured_by_any(among, anywhere, unmeasured).sum())
+    return _by_cause(claims, asked), share.gains(changes)
+
+
+def unmeasurable_by_cause(
+    scene: Scene, devices: Devices, claims: Claims
+) -> dict[str, float]:
+    """Return the lit area that cameras don't reach, as `out_of_reach` does."""
+    samples, _ = _missed(scene, devices, claims)
+    among = scene.among(devices.projectors)
+    asked = least_demands(among, devices.reference_cameras, samples, ())
+    return _by_cause(claims, asked)
+
+
+def _missed(scene: Scene, devices: Devices, claims: Claims) -> tuple[LitSamples, int]:
+    """Return the lit samples that no camera of the plan measures; how many are lit."""
+    target = claims.target_samples
+    planned = scene.among((*devices.projectors, *devices.cameras))
+    lit = np.any(lit_stages(planned, devices.projectors, target) == LIT, axis=1)
+    missed = target.take(lit & ~claims.measured_by.any(axis=1))
+    return lit_samples(planned, devices.projectors, missed), int(lit.sum())
+
+
+def _by_cause(claims: Claims, asked: Demands) -> dict[str, float]:
+    """Return the area of what isn't measured, by how far samples come [m²]."""
+    out = asked.furthest < MEASURED
     counts = np.bincount(asked.furthest[out], minlength=MEASURED)
-    by_cause = {
-        cause: float(target.samples.weight * count)
+    weight = claims.target_samples.samples.weight
+    return {
+        cause: float(weight * count)
         for cause, count in zip(CAUSES, counts, strict=True)
         if count
     }
-    return by_cause, share.gains(changes)
 
 
 def nothing_measured(scene: Scene, rig: Rig, error: NothingMeasuredError) -> str:

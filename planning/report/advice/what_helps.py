@@ -25,15 +25,14 @@ def with_relaxations(
     Of mounts that can't be set to everything: with what that costs, too.
     """
     coverage, areas = claims.coverage, claims.coverage.target
-    least = _asked_reach(partial, "projector")
+    least = _asked_reach(partial.scene.requirements, "projector")
     if falls_short(areas.reachable_by_projectors_m2, areas.area_m2, least):
         with _timed(clock):
             relaxations = reachability_relaxations(
                 partial.scene, devices.reference_projectors
             )
         coverage = coverage.changed(relaxations=relaxations)
-    least = _asked_reach(partial, "camera")
-    if falls_short(areas.reachable_by_cameras_m2, areas.lit_m2, least):
+    if cameras_reach_too_little(partial.scene.requirements, coverage):
         with _timed(clock):
             causes, relaxations = out_of_reach(
                 partial.scene, partial.request.rig, devices, claims
@@ -68,9 +67,14 @@ def with_fewer_needed(
     return proofs
 
 
-def _asked_reach(partial: PartialPlan, kind: str) -> float:
+def cameras_reach_too_little(required: Requirements, coverage: Coverage) -> bool:
+    """Return whether it is said why cameras reach so little, and what would help."""
+    areas, least = coverage.target, _asked_reach(required, "camera")
+    return falls_short(areas.reachable_by_cameras_m2, areas.lit_m2, least)
+
+
+def _asked_reach(required: Requirements, kind: str) -> float:
     """The share of reach below which it is said what would give more."""
-    required = partial.scene.requirements
     mount = required.workspace.mount_of(kind)
     told = _TOLD if mount is not None and mount.is_stepped else 0.0
     return max(required.min_reachable, told)

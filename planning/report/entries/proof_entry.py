@@ -16,7 +16,9 @@ from planning.proofs.quotas import required_samples
 from planning.proofs.selection import cover_problem
 from planning.report.partial_plan import PartialPlan
 from planning.scene.draws import DRAWS, Draw
-from planning.scene.lighting import light_on
+from planning.scene.lighting import light_on, lit_stages
+from planning.scene.limits.projector_limits import LIT
+from planning.scene.measured import LitSamples, measured_by
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from solvers.covers.cover import reduced_problem
@@ -57,7 +59,7 @@ def with_proofs(
         "camera": (
             certificates.cameras,
             _frozen(scene, target, _camera_draws()) if _stand(partial) else None,
-            cover.measured,
+            _measured(partial),
             limits.coverage,
             partial.camera_stage.refutation,
         ),
@@ -93,6 +95,22 @@ def _stand(partial: PartialPlan) -> bool:
         np.allclose(light.offsets, light_on(p, lit.target).offsets, rtol=0, atol=_MOVED)
         for light, p in zip(lit.lights, projectors, strict=True)
     )
+
+
+def _measured(partial: PartialPlan) -> NDArray[np.bool_]:
+    """Return which candidate measures which sample of the cover, shape (n, m).
+
+    With the rings as they are written: finer ones than those that cameras were covered
+    for let candidates reach less, of which a share asks for less.
+    """
+    cover, projectors = partial.camera_stage.cover, partial.final_projectors
+    if partial.rings is None:
+        return cover.measured
+    scene, target = partial.scene.among(projectors), cover.samples.target
+    lit = lit_stages(scene, projectors, target) == LIT
+    written = LitSamples.of(projectors, target, lit)
+    views = cover.candidates.on(target)
+    return measured_by(scene, cover.candidates.cameras, written, views)
 
 
 _Ints = NDArray[np.int64]

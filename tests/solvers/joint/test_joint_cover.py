@@ -306,6 +306,12 @@ def test_what_is_no_problem_is_refused(change, words):
         JointProblem(**(sound | change))
 
 
+def test_devices_of_one_kind_alone_measure_nothing():
+    problem = random_problem(1)
+    for some in (((), (0, 1)), ((0, 1), ()), ((), ())):
+        assert not problem.measured_by(*some).any()
+
+
 def test_a_requirement_is_at_least_nothing():
     with pytest.raises(ValueError, match="at least 0"):
         Requirement(-1)

@@ -739,6 +739,29 @@ def test_a_superfluous_device_refutes_the_bound(handmade):
     )
 
 
+@pytest.mark.parametrize(
+    ("spacing", "holds"), [("uniform", False), ("curvature", True)]
+)
+def test_cameras_may_have_reached_more_before_rings_were_spaced(
+    handmade, spacing, holds
+):
+    """Finer rings pass less: what was asked is of all that is lit at most."""
+
+    def change(document):
+        proof = document["certificates"]["cameras"]
+        n, areas = proof["n_samples"], document["coverage"]["target"]
+        proof["continuous"] = _anywhere(1, n_samples=n, n_reached=n)(None)
+        share = document["requirements"]["coverage"]
+        proof["required_m2"] = share * areas["lit_m2"]
+        for projector in document["projectors"]:
+            projector["rings"] = LEAVES_OUT | {"spacing": spacing}
+
+    found = failures(handmade.tampered(handmade.build_plan(), change))
+    named = "cameras.continuous.n_reached", "cameras.required_m2"
+    told = [any(name in line for line in found) for name in named]
+    assert told == [not holds] * 2
+
+
 def test_reference_poses_outside_the_workspace_are_counted(handmade):
     plan = handmade.build_plan()
     poses = plan.surface.reference_cameras.copy()

@@ -13,6 +13,7 @@ import numpy as np
 
 from geometry.arrays import Array, Ints, Mask
 from planning.model.device_poses import moved_to
+from planning.model.errors import InfeasibleLimitsError
 from planning.model.heads import Turntable
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Workspace
@@ -93,16 +94,27 @@ class TableLattice:
         projectors: Sequence[PlannedProjector],
         cameras: Sequence[PlannedCamera],
     ) -> "TableLattice":
-        """Return the circles of each model on which the room leaves a place."""
+        """Return the circles of each model on which the room leaves a place.
+
+        Raises:
+            InfeasibleLimitsError: If it leaves none to projectors, or to cameras.
+        """
         empty = cls(table, space, (), ())
-        return cls(
-            table,
-            space,
-            tuple(
-                d for t in projectors for d in empty.circles(t) if empty.room(d).any()
-            ),
-            tuple(d for t in cameras for d in empty.circles(t) if empty.room(d).any()),
+        lamps = tuple(
+            d for t in projectors for d in empty.circles(t) if empty.room(d).any()
         )
+        eyes = tuple(
+            d for t in cameras for d in empty.circles(t) if empty.room(d).any()
+        )
+        for kind, left in (("projector", lamps), ("camera", eyes)):
+            if not left:
+                raise InfeasibleLimitsError(
+                    f"no place on {_CIRCLES} circles about the turntable's axis, in "
+                    f"the middle of the standoff and its play, is left to a {kind} by "
+                    f"the workspace; widen it, thicken its mounting planes, or change "
+                    f"standoff_mm"
+                )
+        return cls(table, space, lamps, eyes)
 
     @property
     def n_angles(self) -> int:

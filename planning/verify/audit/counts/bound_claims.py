@@ -34,9 +34,11 @@ def audit_continuous(
     target = case.plan.coverage.target
     whole = target.area_m2 if kind.name == "projector" else target.lit_m2
     if whole > 0.0:
-        share = kind.reachable_m2 / whole
+        share, once = (
+            area / whole for area in (kind.reachable_m2, _once_reachable_m2(kind, case))
+        )
         slack = max(samples, 1) * _noise(samples, share, 1.0)
-        most, least = samples * share, kind.share * samples * share
+        most, least = samples * once, kind.share * samples * share
         below.holds(
             least - slack <= table.n_reached <= most + slack,
             "n_reached",
@@ -80,16 +82,18 @@ def audit_areas(
     If no fewer devices suffice, the bound on one fewer must fall short too.
     """
     claims, whole = kind.proof, case.estimator.target_m2
+    reachable = _once_reachable_m2(kind, case)
     required = kind.share * kind.reachable_m2
+    # What was reachable then is between what is and what was at most.
+    required = min(max(claims.required_m2, required), kind.share * reachable)
     findings.number("required_m2", claims.required_m2, required, slack)
     best, fewer = claims.best_area.upper_bound_m2, claims.one_fewer
-    room = _noise(claims.n_samples, kind.reachable_m2, whole)
+    room = _noise(claims.n_samples, reachable, whole)
     findings.holds(
-        best <= kind.reachable_m2 + room,
+        best <= reachable + room,
         "best_area.upper_bound_m2",
-        f"{square_centimetres(best)} exceeds the "
-        f"{square_centimetres(kind.reachable_m2)} that can be reached (tolerance "
-        f"{square_centimetres(room)})",
+        f"{square_centimetres(best)} exceeds the {square_centimetres(reachable)} that "
+        f"can be reached (tolerance {square_centimetres(room)})",
     )
     if fewer is None:
         return
@@ -144,6 +148,18 @@ def audit_by_count(kind: DeviceKind, case: AuditCase, findings: AuditFindings) -
             f"marginal has {square_centimetres(area)} (tolerance "
             f"{square_centimetres(room)})",
         )
+
+
+def _once_reachable_m2(kind: DeviceKind, case: AuditCase) -> float:
+    """Return what the candidates reached at most when devices were chosen of them.
+
+    Rings that were spaced finer since let cameras reach less of what is lit.
+    """
+    rings = [projector.rings for projector in case.plan.document.projectors]
+    spaced = any(one is not None and one.spacing == "curvature" for one in rings)
+    if kind.name == "camera" and spaced:
+        return case.plan.coverage.target.lit_m2
+    return kind.reachable_m2
 
 
 def _noise(n_samples: int, area_m2: float, whole: float) -> float:

@@ -46,9 +46,11 @@ def audit_deviations(
     """
     claims = case.plan.coverage
     n = len(next(iter(terms.values())))
+    # By the claim: of a trace other samples than these may have been measured.
+    measured = claims.target.measured_m2 > 0.0
+    either = "null, but the target is measured" if measured else "not measured"
+    below.holds((claims.sigma is None) != measured, "", either)
     if claims.sigma is None or not n:
-        either = "null, but the target is measured" if n else "not measured"
-        below.holds((claims.sigma is None) == (not n), "", either)
         return
     claimed = int(claims.samples * claims.target.measured_m2 / claims.target.area_m2)
     for name, share in _SHARES.items():
