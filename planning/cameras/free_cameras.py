@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.document.certificates import RouteCounts
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.moved_poses import free_devices
 from planning.proofs.selection import CandidateCover
@@ -98,7 +97,7 @@ def one_camera_fewer(
     needed = again.selection.needed
     if needed >= proof.needed.count:
         return None
-    routes = RouteCounts(asked="both", cover=needed, paper=None, taken="cover", why=_WHY)
-    if stage.routes is not None:
-        routes = stage.routes.changed(cover=needed, taken="cover", why=_WHY)
+    routes = stage.routes
+    if routes is not None:
+        routes = routes.changed(cover=needed, taken="cover", why=_WHY)
     return camera_stage(scene, again, routes)
