@@ -40,9 +40,9 @@ _Tree = DirectionTree | PositionTree
 DEFAULT = Effort(
     finest=8, maps=6, budget=3.5e9, shadows=3e8, most_samples=2000, starts=1
 )
-# Share of the work for a search without shadows, where they can be drawn, and how many
-# levels rougher its cells are.
-_FIRST, _ROUGHER = 0.3, 2
+# Share of the work for a search without shadows, where they can be drawn, and the level
+# that its cells end at: finer ones have refuted nothing there.
+_FIRST, _FIRST_FINEST = 0.3, 9
 PROVE = Effort(finest=11, maps=7, budget=4e10, shadows=np.inf, offers=150, starts=4)
 
 
