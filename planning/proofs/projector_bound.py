@@ -93,7 +93,7 @@ def bound_projectors(
     # Shadows cost most, and what is proved without them holds with them.
     first = effort
     if shadows:
-        maps, finest = max(0, effort.maps - 1), max(0, effort.finest - _ROUGHER)
+        maps, finest = max(0, effort.maps - 1), min(effort.finest, _FIRST_FINEST)
         first = replace(effort, maps=maps, finest=finest, budget=_FIRST * effort.budget)
     bound, tree = searched(first, shadows=False)
     if shadows and bound.status is not CellStatus.PROVED:
