@@ -185,6 +185,26 @@ def test_parts_derived_from_other_requirements_say_so(plan):
     assert "requirements.coverage" not in named
 
 
+def test_a_check_says_of_which_plan_it_was(plan):
+    nothing = dict.fromkeys(
+        ("accuracy_rms_m", "accuracy_p95_m", "accuracy_bias_m", "predicted_missing"),
+        None,
+    )
+    figures = {"n_points": 0, "n_merged": 0, "redundant_fraction": 0.0, **nothing}
+    figures |= {"completeness": [], "pixel_noise": None, "ambient": None}
+    figures |= {"passed": True, "failures": [], "asked": plan.coverage.asked}
+
+    def named(digest):
+        document = plan.to_document()
+        document["reconstruction"] = figures | {"plan": digest}
+        edited = RigPlan.from_document(document, plan.surface)
+        return {line.split(":")[0] for line in found(edited, again=None).failures}
+
+    assert not any(key.startswith("reconstruction") for key in named(plan.digest))
+    assert "reconstruction.plan" in named(None)
+    assert "reconstruction.plan" in named("0" * 64)
+
+
 def test_a_request_left_out_shows_where_the_code_is_the_same(plan):
     document = plan.to_document()
     del document["request"]

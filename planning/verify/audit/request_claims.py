@@ -228,6 +228,12 @@ def _audit_digests(plan: RigPlan, findings: AuditFindings) -> None:
     }
     if document.reconstruction is not None:
         parts["reconstruction"] = document.reconstruction.asked
+        # Which plan it was of is compared where it is said (`contradictions`).
+        findings.holds(
+            document.reconstruction.plan is not None or document.request is None,
+            "reconstruction.plan",
+            "is missing: nothing says of which plan the check was",
+        )
     for name, digest in parts.items():
         findings.holds(
             digest == truth or (digest is None and document.request is None),

@@ -85,14 +85,17 @@ def audit_shares(case: AuditCase, findings: AuditFindings) -> None:
     if len(document.meshes) == 1 and document.members:
         member, checked = document.members[0], document.reconstruction
         sole = len(document.members) == 1
+        regions = tuple(region.id for region in document.regions)
         for name, same in (
+            ("mesh", member.mesh == 0),
+            ("regions", member.regions == regions),
             ("coverage", sole and member.coverage == document.coverage),
             ("reconstruction", member.reconstruction in (checked, None)),
         ):
             findings.holds(
                 same,
                 f"members.0.{name}",
-                f"differs from {name}, of which it is the only member",
+                f"differs from the plan's, of which it is the only member",
             )
 
 
