@@ -18,9 +18,10 @@ every plan. Of other edits the figures of the check, the samples and, where they
 matter, the claims that come out again are those of the plan as made; and of what is no
 claim the slowest audits are left out. Prints for each section how many edits were
 refused when read (exit 3), found (exit 1), passed, or crashed; then each kind of which
-one passed. `planning.verify.trust` says what is no claim, each with its reason, and
-what verify tells is taken on trust. Returns 1 where another passes, or anything
-crashes.
+one passed. `planning.verify.no_claims` says what is no claim, each with its reason, and
+`planning.verify.trust` what verify tells is taken on trust. A key left out that is read
+as the value it had, since that is its default, is *the same* plan to every reader.
+Returns 1 where another passes, or anything crashes.
 """
 
 import argparse
@@ -97,7 +98,9 @@ def main() -> int:
             for what, other in edits(value):
                 how = judge.edited(path, other)
                 print(f"{kind}: {what}: {how}", file=sys.stderr)
-                if how == "passed":
+                if how == "passed" and judge.reads_the_same(path, other):
+                    how = "the same"
+                elif how == "passed":
                     how = _excused(".".join(map(str, path)))
                 if how == "on trust" and judge.differs_planned_again(path, other):
                     how = "replanned"
@@ -134,6 +137,13 @@ class Judge:
         put(edited, path, value)
         plan = self._forged(edited)
         return bool(hold_claims(plan, lambda *_: self._whole, 1)[0])
+
+    def reads_the_same(self, path: KeyPath, value: object) -> bool:
+        """Whether a plan with another value at a place is read as the plan as made."""
+        edited = copy.deepcopy(self.document)
+        put(edited, path, value)
+        read = RigPlan.from_document(edited, self._plan.surface)
+        return read.document == self._plan.document
 
     def edited(self, path: KeyPath, value: object) -> str:
         """How the plan ends with another value at a place, and wherever it is again."""
@@ -251,12 +261,13 @@ def _note(
     how: str,
 ) -> None:
     ended[kind.split(".")[0]][how.split(":")[0]] += 1
-    if how not in ("refused", "found", "replanned"):
+    if how not in ("refused", "found", "replanned", "the same"):
         let_by[kind].append(words)
 
 
 def _print(ended: dict[str, Counter[str]], let_by: dict[str, list[str]]) -> bool:
-    kinds = "refused", "found", "replanned", "no claim", "on trust", "passed", "crashed"
+    kinds = "refused", "found", "replanned", "the same", "no claim", "on trust"
+    kinds += "passed", "crashed"
     print(f"| section | {' | '.join(kinds)} |\n{(len(kinds) + 1) * '|---'}|")
     total = Counter[str]()
     for section, counts in ended.items():
