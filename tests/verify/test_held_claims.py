@@ -138,6 +138,43 @@ def test_a_row_of_more_devices_follows_the_one_it_adds_to(plan):
     assert failure.startswith("marginal.cameras.")
 
 
+LEFT_OUT = object()
+
+
+def edit(place, value):
+    def change(document):
+        for name in place[:-1]:
+            document = document[name]
+        if value is LEFT_OUT:
+            del document[place[-1]]
+        else:
+            document[place[-1]] = value
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [
+        ("rig.rings.tilt", "much"),
+        ("rig.rings.gap_m", True),
+        ("rig.rings.margin_m", None),
+        ("rig.workspace.half_angle_deg", [1.0]),
+        ("rig.workspace.axis", {"x": 1.0}),
+        ("rig.workspace.axis", [0.0, 0.0, 0.0]),
+        ("rig.calibration.position_mm", "much"),
+        ("requirements.triangulation.drawn_edges.camera_px", -0.6),
+        ("requirements.triangulation.drawn_edges.in_focus_m", -2.5e-4),
+        ("projectors.0.rings.left_out", [-1.0]),
+    ],
+)
+def test_what_no_rig_can_state_is_refused_when_read(plan, place, value):
+    keys = [int(key) if key.isdigit() else key for key in place.split(".")]
+    with pytest.raises(PlanFileError, match=r"plan again$") as refused:
+        forged(plan, edit(keys, value))
+    assert len(str(refused.value).splitlines()) == 1
+
+
 @pytest.mark.parametrize("value", [{"x": 1}, "much", [[1.0], 2.0], True])
 def test_a_rig_table_that_holds_anything_is_told_and_never_crashes(plan, value):
     def change(document):
