@@ -154,6 +154,27 @@ def edit(place, value):
 
 
 @pytest.mark.parametrize(
+    ("place", "value", "named"),
+    [
+        ("rig.workspace.half_angle_deg", 7.0, "requirements.workspace.half_angle"),
+        ("rig.workspace.axis", [1.0, 0.0, 0.0], "requirements.workspace.axis"),
+        ("rig.workspace.shape", "cone", "requirements.workspace.half_angle"),
+        ("rig.workspace.floor_mm", LEFT_OUT, "rig.workspace.floor_mm"),
+        ("rig.calibration.angle_deg", None, "triangulation.calibration.angle"),
+        ("rig.calibration.angle_deg", LEFT_OUT, "rig.calibration.angle_deg"),
+        ("rig.rings.tilt", LEFT_OUT, "rig.rings.tilt"),
+        ("rig.rings.spacing", "wide", "rings.spacing"),
+        ("requirements.workspace.half_angle", 2.0, "requirements.workspace.half_angle"),
+        ("requirements.triangulation.max_angle", 7.0, "triangulation.max_angle"),
+    ],
+)
+def test_what_was_used_is_what_the_rig_states(plan, place, value, named):
+    edited = forged(plan, edit(place.split("."), value))
+    failures = found(edited, again=None).failures
+    assert any(line.split(":")[0].endswith(named) for line in failures), failures
+
+
+@pytest.mark.parametrize(
     ("place", "value"),
     [
         ("rig.rings.tilt", "much"),
