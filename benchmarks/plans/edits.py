@@ -31,8 +31,9 @@ import sys
 import tempfile
 import time
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +50,10 @@ from planning.model.errors import PlanningError
 from planning.report.made_again import again_or_why_not, made_again
 from planning.verify.audit.audit import first_false
 from planning.verify.audit.audit_case import examine
+from planning.verify.audit.audit_findings import AuditFindings
+from planning.verify.audit.counts.table_claims import audit_limits
 from planning.verify.audit.figure_claims import contradictions
+from planning.verify.audit.request_claims import audit_request
 from planning.verify.held_figures import EXACTLY, WHOLLY, hold_claims, hold_figures
 from planning.verify.no_claims import NO_CLAIM, is_under
 from planning.verify.trust import is_trusted
@@ -128,8 +132,14 @@ class Judge:
         self._plan, self.document = plan, plan.to_document()
         self._case, self._made = found.audit.case, made_again(plan, threads=1)
         self._fresh = found.reconstruction.record()
-        self._whole = PlannedAgain(plan, asked_again(plan), quiet=True)(plan, 1)
-        assert hold_claims(plan, lambda *_: self._whole, 1) == ((), WHOLLY)
+
+    @cached_property
+    def _whole(self) -> Mapping[str, Any]:
+        """The plan made again from its words."""
+        plan = self._plan
+        whole = PlannedAgain(plan, asked_again(plan), quiet=True)(plan, 1)
+        assert hold_claims(plan, lambda *_: whole, 1) == ((), WHOLLY)
+        return whole
 
     def differs_planned_again(self, path: KeyPath, value: object) -> bool:
         """Whether `plan verify --replan` finds another value at a place."""
@@ -191,6 +201,11 @@ class Judge:
             case = replace(self._case, plan=plan, estimator=whole)
             yield first_false(case, quick=quick)
         else:
+            # What compares parts of the plan alone needs no samples.
+            findings, case = AuditFindings(), replace(self._case, plan=plan)
+            for audit_claims in (audit_request, audit_limits):
+                audit_claims(case, findings)
+            yield findings.failures
             yield first_false(examine(plan, seed=seed, threads=1), quick=quick)
         if quick:
             return
