@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 from support.little_work import work_least
@@ -151,6 +152,20 @@ def edit(place, value):
             document[place[-1]] = value
 
     return change
+
+
+def test_steep_directions_are_those_that_come_out_of_the_mesh(plan):
+    steep = plan.surface.steep.copy()
+    face = np.flatnonzero(steep.any(axis=1))[0]
+    aside = np.cross(plan.surface.mesh.face_normals[face], steep[face])
+    turned = steep[face] + 1e-3 * aside
+    steep[face] = turned / np.linalg.norm(turned)
+    surface, document = replace(plan.surface, steep=steep), plan.to_document()
+    document["surface"]["sha256"] = surface.sha256()
+    edited = RigPlan.from_document(document, surface)
+    assert found(edited, again=None).failures == ()
+    named = {line.split(":")[0] for line in found(edited).failures}
+    assert "surface.sha256" in named
 
 
 @pytest.mark.parametrize(
