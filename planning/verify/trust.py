@@ -34,11 +34,12 @@ ON_TRUST = {
         "certificates.*.alone",
         "certificates.*.routes",
     ),
-    "how the rig's optics follow from its figures, and how many poses it offered": (
-        "rig.projector.figures",
-        "rig.camera.figures",
-        "rig.more_*.figures",
-        "rig.projector.distortion",
+    "figures of the rig that may bind nothing, and how many poses it offered": (
+        *(f"rig.*.figures.{n}" for n in ("range_mm", "frame_rate_hz", "exposure_ms")),
+        *(f"rig.*.figures.{n}" for n in ("response", "mount")),
+        # Rings are drawn as if a projector's lens were straight.
+        "rig.projector.figures.distortion",
+        "rig.more_projectors.*.figures.distortion",
         "rig.n_candidate_*",
     ),
     "how the rig lays out rings at first, and its limits of other patterns": (
