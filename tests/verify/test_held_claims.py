@@ -210,6 +210,8 @@ def test_what_was_used_is_what_the_rig_states(plan, place, value, named):
         ("requirements.triangulation.drawn_edges.camera_px", -0.6),
         ("requirements.triangulation.drawn_edges.in_focus_m", -2.5e-4),
         ("projectors.0.rings.left_out", [-1.0]),
+        ("certificates.cameras.best_area.scope", "every pose"),
+        ("certificates.projectors.one_fewer.scope", ""),
     ],
 )
 def test_what_no_rig_can_state_is_refused_when_read(plan, place, value):
