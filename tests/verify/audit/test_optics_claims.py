@@ -18,7 +18,7 @@ CALIBRATED = {
         "resolution_px": [1280, 960],
         "focal_px": [1500.0, 1510.0],
         "principal_point_px": [640.5, 470.25],
-        "distortion": [-0.1, 0.02, 1e-4, -2e-4],
+        "distortion": [-0.1, 0.02, 1e-4, -2e-4, 0.0],
         "range_mm": [400.0, 2000.0],
     },
 }
@@ -45,6 +45,12 @@ def test_what_a_calibration_states_is_taken_as_it_stands():
     assert failure.startswith("distortion: claimed")
     (failure,) = failures(ModelRecord(**CALIBRATED | {"range_m": [0.4, 2.1]}), "camera")
     assert failure.startswith("range_m: claimed")
+
+
+def test_a_coefficient_less_is_another_lens():
+    figures = CALIBRATED["figures"] | {"distortion": [-0.1, 0.02, 1e-4, -2e-4]}
+    (failure,) = failures(ModelRecord(**CALIBRATED | {"figures": figures}), "camera")
+    assert failure.startswith("distortion: claimed")
 
 
 def test_depth_of_field_is_that_of_similar_triangles():

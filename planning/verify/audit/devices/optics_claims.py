@@ -56,7 +56,7 @@ def audit_model(model: ModelRecord, kind: str, findings: AuditFindings) -> None:
     findings.same("K", model.K, image, whose, _PIXELS)
     # Rings are drawn as if a projector's lens were straight.
     bent = figures.distortion if kind == "camera" else None
-    terms = [*(bent or ()), *5 * [0.0]][:5]
+    terms = 5 * [0.0] if bent is None else list(bent)
     findings.same("distortion", model.distortion, terms, whose, _ROUNDING)
     low, high = figures.range_mm or (0.0, math.inf)
     near, far = 0.0, math.inf
