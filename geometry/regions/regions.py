@@ -65,6 +65,15 @@ class DominantRegions:
     def __getitem__(self, index: int) -> Region:
         return self.regions[index]
 
+    def steep_on(self, target: str | None) -> Array:
+        """Return T1 of each face of a target, zero elsewhere, where it binds nothing.
+
+        That is the whole `surface`, or else the regions.
+        """
+        if target == "surface":
+            return self.steep
+        return np.where((self.face_region >= 0)[:, None], self.steep, 0.0)
+
 
 def dominant_regions(
     mesh: TriangleMesh,

@@ -107,6 +107,7 @@ def made_again(plan: RigPlan, *, threads: int) -> dict[str, Any]:
     parts["surface"] = {
         "curvature_radius_m": field.radius,
         "dominant_share": regions.dominant_share,
+        "sha256": _surface_digest(plan, regions),
     }
     mesh = entries.mesh_record(scene.mesh, scene.shell).to_document()
     parts["meshes"] = [{name: mesh[name] for name in ("area_m2", "shell")}]
@@ -132,6 +133,22 @@ def _regions(plan: RigPlan, field: CurvatureField) -> DominantRegions:
     if selection is None or selection.kind == "curvature":
         return dominant_regions(mesh, field)
     return regions_of_faces(mesh, field, plan.surface.in_dominant)
+
+
+def _surface_digest(plan: RigPlan, regions: DominantRegions) -> str:
+    """The plan's own digest of its surface, if regions and T1 are those found again.
+
+    Another zlib packs the same arrays otherwise, so that they are compared as numbers.
+    """
+    again = replace(
+        plan.surface,
+        region=regions.face_region,
+        steep=regions.steep_on(plan.requirements.target),
+    )
+    same = np.array_equal(again.region, plan.surface.region) and np.array_equal(
+        again.steep, plan.surface.steep
+    )
+    return plan.document.surface.sha256 if same else again.sha256()
 
 
 def _marginal(

@@ -79,7 +79,7 @@ def prepared_for(
     scene = Scene(
         mesh,
         regions.face_region,
-        _steep(regions, request.wishes.target),
+        regions.steep_on(request.wishes.target),
         requirements,
         request.seed,
         request.threads,
@@ -169,13 +169,6 @@ def _resolve(request: PlanRequest) -> tuple[Requirements, NDArray[np.float64]]:
         workspace, reference_ring_radius=float(radii[-1]), bearing=(x, y, z)
     )
     return replace(requirements, workspace=workspace), radii
-
-
-def _steep(regions: DominantRegions, target: str | None) -> NDArray[np.float64]:
-    """T1 of each face of the target; zero elsewhere, where it binds nothing."""
-    if target == "surface":
-        return regions.steep
-    return np.where((regions.face_region >= 0)[:, None], regions.steep, 0.0)
 
 
 def offered(ready: Prepared) -> tuple[tuple[PlannedProjector, ...], CandidateViews]:

@@ -34,21 +34,25 @@ ON_TRUST = {
         "certificates.*.alone",
         "certificates.*.routes",
     ),
-    "how the rig's optics follow from its figures, and how many poses it offered": (
-        "rig.projector.figures",
-        "rig.camera.figures",
-        "rig.more_*.figures",
-        "rig.projector.distortion",
+    "figures of the rig that may bind nothing, and how many poses it offered": (
+        *(f"rig.*.figures.{n}" for n in ("range_mm", "frame_rate_hz", "exposure_ms")),
+        *(f"rig.*.figures.{n}" for n in ("response", "mount")),
+        # Rings are drawn as if a projector's lens were straight.
+        "rig.projector.figures.distortion",
+        "rig.more_projectors.*.figures.distortion",
         "rig.n_candidate_*",
     ),
-    "parts of the rig's tables, rings left out, and axes that no limit asks for": (
-        "rig.rings",
-        "rig.workspace",
-        "rig.calibration",
-        "rig.limits",
-        "requirements.workspace.axis",
+    "how the rig lays out rings at first, and its limits of other patterns": (
+        *(f"rig.rings.{n}" for n in ("tilt", "shift_m", "gap_m", "outer_radius")),
+        "rig.rings.margin_m",
+        "rig.limits.min_angle_deg",
+        "rig.limits.max_angle_deg",
+        "rig.limits.min_conditioning",
+        "rig.limits.min_ring_pitch_px",
+        "rig.limits.ring_sigma_mm",
+    ),
+    "where candidates begin, rings left out, and axes that no limit asks for": (
         "requirements.workspace.bearing",
-        "requirements.triangulation.drawn_edges",
         "projectors.*.rings.left_out",
         "ring_axes.other",
     ),

@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 from support.little_work import work_least
@@ -168,6 +169,88 @@ def test_a_row_of_more_devices_follows_the_one_it_adds_to(plan):
     assert failure.startswith("marginal.cameras.")
 
 
+LEFT_OUT = object()
+
+
+def edit(place, value):
+    def change(document):
+        for name in place[:-1]:
+            document = document[name]
+        if value is LEFT_OUT:
+            del document[place[-1]]
+        else:
+            document[place[-1]] = value
+
+    return change
+
+
+def test_steep_directions_are_those_that_come_out_of_the_mesh(plan):
+    steep = plan.surface.steep.copy()
+    face = np.flatnonzero(steep.any(axis=1))[0]
+    aside = np.cross(plan.surface.mesh.face_normals[face], steep[face])
+    turned = steep[face] + 1e-3 * aside
+    steep[face] = turned / np.linalg.norm(turned)
+    surface, document = replace(plan.surface, steep=steep), plan.to_document()
+    document["surface"]["sha256"] = surface.sha256()
+    edited = RigPlan.from_document(document, surface)
+    assert found(edited, again=None).failures == ()
+    named = {line.split(":")[0] for line in found(edited).failures}
+    assert "surface.sha256" in named
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "named"),
+    [
+        ("rig.workspace.half_angle_deg", 7.0, "requirements.workspace.half_angle"),
+        ("rig.workspace.axis", [1.0, 0.0, 0.0], "requirements.workspace.axis"),
+        ("rig.workspace.shape", "cone", "requirements.workspace.half_angle"),
+        ("rig.workspace.floor_mm", LEFT_OUT, "rig.workspace.floor_mm"),
+        ("rig.calibration.angle_deg", None, "triangulation.calibration.angle"),
+        ("rig.calibration.angle_deg", LEFT_OUT, "rig.calibration.angle_deg"),
+        ("rig.camera.figures.focal_mm", 24.0, "rig.camera.K"),
+        ("rig.camera.figures.pixel_um", LEFT_OUT, "rig.camera.figures"),
+        ("rig.camera.figures.resolution_px", [2048, 1537], "rig.camera.resolution"),
+        ("rig.camera.figures.focus.f_number", 11.01, "rig.camera.range_m"),
+        ("rig.projector.figures.throw_ratio", 1.49, "rig.projector.K"),
+        ("rig.projector.figures.vertical_offset_percent", None, "rig.projector.K"),
+        ("rig.projector.distortion", [1e-3, 0, 0, 0, 0], "rig.projector.distortion"),
+        ("rig.camera.figures.body", {"size_mm": [9.0, 9.0, 9.0]}, "body.half_m"),
+        ("rig.rings.tilt", LEFT_OUT, "rig.rings.tilt"),
+        ("rig.rings.spacing", "wide", "rings.spacing"),
+        ("requirements.workspace.half_angle", 2.0, "requirements.workspace.half_angle"),
+        ("requirements.triangulation.max_angle", 7.0, "triangulation.max_angle"),
+    ],
+)
+def test_what_was_used_is_what_the_rig_states(plan, place, value, named):
+    edited = forged(plan, edit(place.split("."), value))
+    failures = found(edited, again=None).failures
+    assert any(line.split(":")[0].endswith(named) for line in failures), failures
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [
+        ("rig.rings.tilt", "much"),
+        ("rig.rings.gap_m", True),
+        ("rig.rings.margin_m", None),
+        ("rig.workspace.half_angle_deg", [1.0]),
+        ("rig.workspace.axis", {"x": 1.0}),
+        ("rig.workspace.axis", [0.0, 0.0, 0.0]),
+        ("rig.calibration.position_mm", "much"),
+        ("requirements.triangulation.drawn_edges.camera_px", -0.6),
+        ("requirements.triangulation.drawn_edges.in_focus_m", -2.5e-4),
+        ("projectors.0.rings.left_out", [-1.0]),
+        ("certificates.cameras.best_area.scope", "every pose"),
+        ("certificates.projectors.one_fewer.scope", ""),
+    ],
+)
+def test_what_no_rig_can_state_is_refused_when_read(plan, place, value):
+    keys = [int(key) if key.isdigit() else key for key in place.split(".")]
+    with pytest.raises(PlanFileError, match=r"plan again$") as refused:
+        forged(plan, edit(keys, value))
+    assert len(str(refused.value).splitlines()) == 1
+
+
 @pytest.mark.parametrize("value", [{"x": 1}, "much", [[1.0], 2.0], True])
 def test_a_rig_table_that_holds_anything_is_told_and_never_crashes(plan, value):
     def change(document):
@@ -213,6 +296,26 @@ def test_parts_derived_from_other_requirements_say_so(plan):
     named = {line.split(":")[0] for line in found(edited, again=None).failures}
     assert {"coverage.asked", "certificates.asked"} <= named
     assert "requirements.coverage" not in named
+
+
+def test_a_check_says_of_which_plan_it_was(plan):
+    nothing = dict.fromkeys(
+        ("accuracy_rms_m", "accuracy_p95_m", "accuracy_bias_m", "predicted_missing"),
+        None,
+    )
+    figures = {"n_points": 0, "n_merged": 0, "redundant_fraction": 0.0, **nothing}
+    figures |= {"completeness": [], "pixel_noise": None, "ambient": None}
+    figures |= {"passed": True, "failures": [], "asked": plan.coverage.asked}
+
+    def named(digest):
+        document = plan.to_document()
+        document["reconstruction"] = figures | {"plan": digest}
+        edited = RigPlan.from_document(document, plan.surface)
+        return {line.split(":")[0] for line in found(edited, again=None).failures}
+
+    assert not any(key.startswith("reconstruction") for key in named(plan.digest))
+    assert "reconstruction.plan" in named(None)
+    assert "reconstruction.plan" in named("0" * 64)
 
 
 def test_a_request_left_out_shows_where_the_code_is_the_same(plan):

@@ -81,14 +81,14 @@ class BestArea(Part):
 
     value_m2: float
     upper_bound_m2: float
-    scope: str = "candidates"
+    scope: Literal["candidates"] = "candidates"
 
 
 class OneFewer(Part):
     """What one device fewer covers at most."""
 
     upper_bound_m2: float
-    scope: str = "candidates"
+    scope: Literal["candidates"] = "candidates"
 
 
 CamerasBy = Literal["cover", "paper", "both"]

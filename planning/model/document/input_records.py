@@ -187,6 +187,14 @@ class ObstacleRecord(Part):
         return self
 
 
+# Keys of the rig's tables that hold a number, or null.
+_NUMBERS = {
+    "rings": ("tilt", "shift_m", "gap_m", "margin_m", "outer_radius"),
+    "workspace": ("half_angle_deg", "floor_mm"),
+    "calibration": ("angle_deg", "position_mm", "focal_percent", "principal_px"),
+}
+
+
 class RigRecord(Part):
     """The resolved rig; tables whose keys end in _mm or _deg are as in its file.
 
@@ -223,11 +231,26 @@ class RigRecord(Part):
 
     @model_validator(mode="after")
     def _numbers(self) -> Self:
-        margin, floor = self.rings.get("margin_m", 0.0), self.workspace.get("floor_mm")
-        if not isinstance(margin, float | int):
-            raise ValueError(f"rings.margin_m = {margin!r} should be a number")
-        if not isinstance(floor, float | int | None):
-            raise ValueError(f"workspace.floor_mm = {floor!r} should be a number")
+        for table, names in _NUMBERS.items():
+            for name in names:
+                value = getattr(self, table).get(name)
+                # A truth is a whole number to Python, and none in a file.
+                if isinstance(value, bool) or not isinstance(value, float | int | None):
+                    raise ValueError(f"{table}.{name} = {value!r} should be a number")
+        if self.rings.get("margin_m", 0.0) is None:
+            raise ValueError("rings.margin_m = None should be a number")
+        return self
+
+    @model_validator(mode="after")
+    def _axis(self) -> Self:
+        axis = self.workspace.get("axis")
+        numbers = isinstance(axis, list) and [
+            x for x in axis if isinstance(x, float | int) and not isinstance(x, bool)
+        ]
+        if axis is not None and not (
+            numbers and len(numbers) == len(axis) == 3 and any(numbers)
+        ):
+            raise ValueError(f"workspace.axis = {axis!r} should be a direction")
         return self
 
     def models(self, kind: str) -> tuple[ModelRecord, ...]:

@@ -17,9 +17,19 @@ def are_radii(radii: tuple[float, ...]) -> tuple[float, ...]:
     Raises:
         ValueError: If they aren't 2 or more, rising from 0.
     """
-    if len(radii) < 2 or not np.all(np.diff(radii, prepend=0.0) > 0):
+    if len(radii) < 2 or not _rise(radii):
         raise ValueError("must be 2 or more, rising from 0")
     return radii
+
+
+def _left_out(radii: tuple[float, ...]) -> tuple[float, ...]:
+    if not _rise(radii):
+        raise ValueError("must rise from 0")
+    return radii
+
+
+def _rise(radii: tuple[float, ...]) -> bool:
+    return bool(np.all(np.diff(radii, prepend=0.0) > 0.0))
 
 
 class CreasesRecord(Part):
@@ -49,7 +59,7 @@ class RingsRecord(Part):
     gap_m: Interval | None
     over_tolerance: float
     creases: CreasesRecord
-    left_out: tuple[float, ...] = ()
+    left_out: Annotated[tuple[float, ...], AfterValidator(_left_out)] = ()
 
 
 class OtherRings(Part):

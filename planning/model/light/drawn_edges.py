@@ -30,6 +30,13 @@ class DrawnEdges:
     focus_m: float | None = None
     aperture_m: float = 0.0
 
+    def __post_init__(self) -> None:
+        for name in ("in_focus_m", "camera_px", "aperture_m"):
+            if not getattr(self, name) >= 0.0:
+                raise ValueError(f"drawn_edges.{name} must be 0 or more")
+        if self.focus_m is not None and not self.focus_m > 0.0:
+            raise ValueError("drawn_edges.focus_m must be positive")
+
     def light_m(self, depths: Array) -> Array:
         """Return the blur of the light at depths [m], any shape.
 

@@ -43,6 +43,7 @@ from planning.verify.audit.devices.evaluation_claims import audit_evaluation
 from planning.verify.audit.devices.exposure_claims import audit_exposures
 from planning.verify.audit.devices.mount_claims import audit_mounts
 from planning.verify.audit.devices.obstacle_claims import audit_obstacles
+from planning.verify.audit.devices.optics_claims import audit_optics
 from planning.verify.audit.devices.stock_claims import audit_stock
 from planning.verify.audit.devices.view_claims import audit_views
 from planning.verify.audit.devices.workspace_claims import audit_workspace
@@ -58,6 +59,7 @@ from .audit_findings import AuditFindings
 from .request_claims import audit_request
 
 _CLAIMS = (
+    audit_optics,
     audit_devices,
     audit_codes,
     audit_workspace,
@@ -100,6 +102,7 @@ _CLAIMS = (
 # Cameras alone: what is said of light and its patterns isn't there.
 _CLAIMS_OF_VIEWS = (
     audit_views,
+    audit_optics,
     audit_devices,
     audit_workspace,
     audit_zones,

@@ -34,6 +34,11 @@ _STATED = {
         *("noise_px", "min_ring_pitch_px", "max_sigma_mm", "ring_sigma_mm"),
         *("min_angle_deg", "max_angle_deg"),
     ),
+    "workspace": ("shape", "axis", "half_angle_deg", "floor_mm", "up"),
+    "rings": (
+        *("tilt", "shift_m", "gap_m", "spacing", "axis", "margin_m", "outer_radius"),
+    ),
+    "calibration": tuple(stated for _, stated, _ in _CALIBRATION),
     "check": (*(f"{name}_mm" for name in _CHECK), *_SHARES, "ambient"),
 }
 
@@ -205,7 +210,8 @@ def _of_rig(plan: RigPlan) -> Iterator[_Pair]:
         value = used.triangulation.ring_sigma_m
         yield key, value, "rig.limits.ring_sigma_mm [m]", stated
     for name, key, unit in _CALIBRATION:
-        if (stated := rig.calibration.get(key)) is not None:
+        if key in rig.calibration:
+            stated = rig.calibration[key]
             errors = used.triangulation.calibration
             value = 0.0 if errors is None else getattr(errors, name)
             where = f"requirements.triangulation.calibration.{name}"
@@ -228,6 +234,12 @@ def _audit_digests(plan: RigPlan, findings: AuditFindings) -> None:
     }
     if document.reconstruction is not None:
         parts["reconstruction"] = document.reconstruction.asked
+        # Which plan it was of is compared where it is said (`contradictions`).
+        findings.holds(
+            document.reconstruction.plan is not None or document.request is None,
+            "reconstruction.plan",
+            "is missing: nothing says of which plan the check was",
+        )
     for name, digest in parts.items():
         findings.holds(
             digest == truth or (digest is None and document.request is None),

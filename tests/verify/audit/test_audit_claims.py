@@ -549,6 +549,11 @@ FALSE = {
         _at("members", 0, "coverage", lambda x: x | {"samples": 1}),
         "members.0.coverage: differs",
     ),
+    "member mesh": (_at("members", 0, "mesh", 1), "members.0.mesh: differs"),
+    "member regions": (
+        _at("members", 0, "regions", lambda x: [*x, 99]),
+        "members.0.regions: differs",
+    ),
     "member check": (
         _at("members", 0, "reconstruction", CHECKED),
         "members.0.reconstruction: differs",

@@ -85,14 +85,17 @@ def audit_shares(case: AuditCase, findings: AuditFindings) -> None:
     if len(document.meshes) == 1 and document.members:
         member, checked = document.members[0], document.reconstruction
         sole = len(document.members) == 1
+        regions = tuple(region.id for region in document.regions)
         for name, same in (
+            ("mesh", member.mesh == 0),
+            ("regions", member.regions == regions),
             ("coverage", sole and member.coverage == document.coverage),
             ("reconstruction", member.reconstruction in (checked, None)),
         ):
             findings.holds(
                 same,
                 f"members.0.{name}",
-                f"differs from {name}, of which it is the only member",
+                "differs from the plan's, of which it is the only member",
             )
 
 
@@ -112,6 +115,7 @@ _OF_RINGS = (
     ("min_conditioning", "triangulation", "min_conditioning", 1.0),
     ("min_ring_pitch_px", "triangulation", "min_ring_pitch_px", 1.0),
 )
+_RING_SIGMA = ("ring_sigma_mm", "triangulation", "ring_sigma_m", 1e-3)
 _OF_PIXELS = (
     ("min_angle_deg", "triangulation", "min_angle", _DEGREE),
     ("max_angle_deg", "triangulation", "max_angle", _DEGREE),
@@ -124,10 +128,12 @@ _ANGLES = {
 
 
 def audit_limits(case: AuditCase, findings: AuditFindings) -> None:
-    """The rig's limits are those of the requirements."""
+    """The rig's limits are those of the requirements; a pattern has none of another."""
     limits = case.plan.document.rig.limits
     pattern = case.plan.requirements.pattern
-    own = _OF_RINGS if pattern == "rings" else _OF_PIXELS
+    own, others = _OF_RINGS, _OF_PIXELS
+    if pattern != "rings":
+        own, others = _OF_PIXELS, (*_OF_RINGS, _RING_SIGMA)
     for name, part, wish, unit in _LIMITS + own:
         stated, whose = limits.get(name), f"rig.limits.{name}"
         if stated is None:
@@ -136,6 +142,11 @@ def audit_limits(case: AuditCase, findings: AuditFindings) -> None:
         required = getattr(getattr(case.plan.requirements, part), wish)
         key = f"requirements.{part}.{wish}"
         findings.same(key, required, truth, whose, _ROUNDING)
+    for _, part, wish, _ in others:
+        key, claimed = f"requirements.{part}.{wish}", case.plan.requirements
+        required = getattr(getattr(claimed, part), wish)
+        none = 0.0 if wish == "min_conditioning" else None
+        findings.same(key, required, none, f"that of the pattern {pattern!r}")
     ambient = case.plan.document.rig.check.get("ambient")
     if ambient is not None:
         key, claimed = "requirements.check.ambient", case.plan.requirements.check

@@ -50,6 +50,7 @@ def audit_zones(case: AuditCase, findings: AuditFindings) -> None:
         f"{space.origin!r}, but rig.workspace states {stated!r}",
     )
     _audit_shell(case, findings)
+    _audit_cone(tables, space, findings)
     off = np.array(space.centre) - origin_of(case.plan)
     rooms = [_as_volume(tables)] if "min_mm" in tables else []
     for name, boxes, stated, same in (
@@ -101,6 +102,30 @@ def _audit_shell(case: AuditCase, findings: AuditFindings) -> None:
             name,
             f"{tiled!r} m, but rig.standoff_m is {standoff:g} m",
         )
+
+
+def _audit_cone(
+    stated: Mapping[str, Any], space: Workspace, findings: AuditFindings
+) -> None:
+    """Compare the cone with the rig's, and the shape that the rig names with its keys.
+
+    Without a cone all of the shell is open, about the direction up.
+    """
+    if not stated:
+        return
+    angle, along = stated.get("half_angle_deg"), stated.get("axis")
+    half, whose = np.radians(angle or 180.0), "by rig.workspace"
+    findings.same("half_angle", space.half_angle, half, whose, _ROUNDING)
+    axis = np.array(space.up if along is None else along)
+    findings.same("axis", space.axis, axis / np.linalg.norm(axis), whose, _ROUNDING)
+    shape = "shell" if angle is None else "cone"
+    findings.holds(
+        stated.get("shape") == ("box" if "min_mm" in stated else shape)
+        and (angle is None) == (along is None),
+        "half_angle",
+        f"rig.workspace has shape {stated.get('shape')!r}, half_angle_deg {angle!r} "
+        f"and axis {along!r}, which don't go together",
+    )
 
 
 def _lever_m(plan: RigPlan) -> float:

@@ -71,8 +71,13 @@ def _audit_spacing(
     case: AuditCase,
     findings: AuditFindings,
 ) -> None:
-    wish = case.plan.document.rig.rings.get("spacing")
-    spacing, count = rings.spacing, rings.n_even
+    stated = case.plan.document.rig.rings
+    wish, spacing, count = stated.get("spacing"), rings.spacing, rings.n_even
+    findings.holds(
+        wish in ("curvature", "uniform") or "spacing" not in stated,
+        "spacing",
+        f"rig.rings.spacing is {wish!r}, must be 'curvature' or 'uniform'",
+    )
     findings.holds(
         spacing != "curvature" or wish != "uniform",
         "spacing",
