@@ -12,7 +12,6 @@ from planning.cameras.camera_cover import (
 from planning.cameras.camera_routes import Widened, cheapest, widest_routes
 from planning.cameras.camera_stage import CameraSolution, follow_cameras
 from planning.cameras.free_cameras import has_room, one_camera_fewer
-from planning.cameras.kept_pairs import rings_for_pairs
 from planning.cameras.proved_cameras import CameraStage, bound_stage
 from planning.model.document.certificates import Certificate
 from planning.model.document.ring_records import RingAxis
@@ -30,6 +29,7 @@ from planning.report.advice.what_helps import falls_short
 from planning.report.partial_plan import PartialPlan, Prepared
 from planning.report.region_claims import below_floor
 from planning.rings.acquisition import pixels_read
+from planning.rings.kept_pairs import rings_for_pairs
 
 from .recalled import fewest_projectors, proved_projectors, widened_projectors
 

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from planning.cameras.camera_cover import CameraCover, candidate_cover
 from planning.cameras.camera_stage import proves_as_much
-from planning.cameras.kept_pairs import rings_for_pairs
 from planning.cameras.proved_cameras import CameraStage, camera_stage
 from planning.model.document.ring_records import AxisTaken
 from planning.model.front import FrontPoint
@@ -17,6 +16,7 @@ from planning.proofs.selection import CandidateCover, Selection, select_fewest
 from planning.report.partial_plan import PartialPlan
 from planning.rings.axis_moves import move_ring_axes
 from planning.rings.centred_axes import centred_axes
+from planning.rings.kept_pairs import rings_for_pairs
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.measured import LitSamples, measured_by, taken

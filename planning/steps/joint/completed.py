@@ -6,7 +6,6 @@ import numpy as np
 
 from planning.cameras.axis_choice import place_for_axes
 from planning.cameras.camera_cover import NothingMeasuredError, plan_cameras
-from planning.cameras.kept_pairs import rings_for_pairs
 from planning.cameras.proved_cameras import CameraStage, camera_stage
 from planning.model.document.input_records import RigRecord
 from planning.model.planned import PlannedCamera, PlannedProjector
@@ -18,6 +17,7 @@ from planning.proofs import projector_bound
 from planning.proofs.candidate_certificate import counted
 from planning.proofs.selection import select_fewest
 from planning.report.partial_plan import PartialPlan
+from planning.rings.kept_pairs import rings_for_pairs
 
 Projectors = tuple[PlannedProjector, ...]
 Cameras = tuple[PlannedCamera, ...]

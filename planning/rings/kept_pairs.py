@@ -8,10 +8,11 @@ import numpy as np
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.losses import PairDemand
 from planning.proofs.quotas import RegionFloors
-from planning.rings.ring_stage import RingStage, Spacing, space_rings
 from planning.scene.draws import DRAWS
 from planning.scene.measured import LitSamples, lit_samples, measuring_pairs
 from planning.scene.scene import Scene
+
+from .ring_stage import RingStage, Spacing, space_rings
 
 # Of what pairs must measure after a loss, kept to spare for fresh samples.
 _MORE = 1.01
