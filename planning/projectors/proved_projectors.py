@@ -25,7 +25,7 @@ from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
 from .candidate_set import CandidateSource
-from .free_poses import ProjectorOffer
+from .free_projectors import ProjectorOffer
 from .projector_stage import ProjectorStage
 
 

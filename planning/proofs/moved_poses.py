@@ -164,14 +164,14 @@ class _Moves(Generic[_D]):
         if not around:
             return poses
         rest = np.any(np.delete(poses.covers, i, axis=1), axis=1)
-        open_ = np.flatnonzero(~rest)
-        most = np.argsort(-known[open_].sum(axis=0), kind="stable")[:_KNOWN]
+        lacking = np.flatnonzero(~rest)
+        most = np.argsort(-known[lacking].sum(axis=0), kind="stable")[:_KNOWN]
         offered = [*around, *(offer.known[k] for k in most)]
-        covers = np.hstack([offer.covers(around, open_), known[open_][:, most]])
+        covers = np.hstack([offer.covers(around, lacking), known[lacking][:, most]])
         missed = []
         for column in covers.T:
             covered = rest.copy()
-            covered[open_[column]] = True
+            covered[lacking[column]] = True
             missed.append(self.missed(covered, _SPARE))
         best = int(np.argmin(missed))
         if missed[best] >= self.missed(poses.covered, _SPARE):

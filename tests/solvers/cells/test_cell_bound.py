@@ -571,7 +571,7 @@ def test_what_nothing_can_serve_is_infeasible(weights, required):
     assert answer.status is CellStatus.INFEASIBLE
 
 
-def test_no_cover_by_free_poses_beats_the_bound(cap_trees):
+def test_no_cover_by_free_projectors_beats_the_bound(cap_trees):
     rng = np.random.default_rng(11)
     for _ in range(2):
         points = rng.normal(size=(150, 3)) * rng.uniform(0.3, 1.0, 3)

@@ -14,9 +14,9 @@ from support.plain_shapes import grid, joined
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import sphere
-from planning.projectors import free_poses as free
+from planning.projectors import free_projectors as free
 from planning.projectors.candidate_set import CandidateSet, CandidateSource
-from planning.projectors.free_poses import ProjectorOffer
+from planning.projectors.free_projectors import ProjectorOffer
 from planning.projectors.projector_stage import ProjectorStage
 from planning.projectors.proved_projectors import prove_fewest
 from planning.proofs.all_poses import Effort
