@@ -1,6 +1,6 @@
 """Claims about light: the rig's figures, exposures, and how bright samples come out."""
 
-from math import sqrt
+from math import log, sqrt
 
 import numpy as np
 
@@ -15,7 +15,9 @@ from planning.verify.audit.predicates.light_levels import LightLevels
 
 _EXACT = 1e-9
 # Of the brightest, the farthest and the most grazing of some samples, against others.
-_EXTREME, _MOST_BEYOND = 0.03, 12
+_EXTREME = 0.03
+# With what chance samples of the audit may deny an extreme that is true.
+_CHANCE = 1e-7
 # How full a planned exposure may be.
 _FULL = 0.95 * 255.0
 _AS_WRITTEN = (
@@ -108,6 +110,15 @@ def _audit_time(
     )
 
 
+def most_beyond(case: AuditCase) -> float:
+    """Return how many of m samples may lie beyond the largest of n others.
+
+    k or more do with a chance of (m / (m + n))^k at most.
+    """
+    m, n = int(case.samples.in_target.sum()), case.estimator.n_claimed
+    return log(_CHANCE) / log(m / (m + max(n, 1))) if m else 0.0
+
+
 def _audit_extremes(
     case: AuditCase,
     p: int,
@@ -134,7 +145,7 @@ def _audit_extremes(
             largest = np.max(getattr(grey, claimed))
         n = int((values > largest).sum())
         below.holds(
-            n <= _MOST_BEYOND,
+            n <= most_beyond(case),
             name,
             f"{n} of {len(values)} samples assigned to it lie beyond",
         )
