@@ -153,21 +153,31 @@ def confirms(
     chosen: NDArray[np.int64],
     fresh: Target,
 ) -> bool:
-    """Return whether chosen candidates measure enough of samples that are fresh.
-
-    Candidates reach no more than is lit, so most often no other has to be looked at.
-    """
+    """Return whether chosen candidates measure enough of samples that are fresh."""
     cameras = tuple(candidates.cameras[i] for i in chosen)
+    if _surely_enough(scene, projectors, cameras, fresh):
+        return True
+    lit, seen = measured_of(scene, projectors, candidates, fresh)
+    return candidate_cover(scene, seen, lit, candidates.cameras).enough(chosen)
+
+
+def _surely_enough(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    cameras: tuple[PlannedCamera, ...],
+    target: Target,
+) -> bool:
+    """Return whether what is measured is enough, whatever other candidates reach.
+
+    They reach no more than is lit, so most often none has to be looked at.
+    """
     lit, measured = measured_of(
-        scene, projectors, CandidateViews(scene, cameras), fresh
+        scene, projectors, CandidateViews(scene, cameras), target
     )
     floors = RegionFloors.of(scene, lit.target, "camera")
     reached = np.ones(len(lit.target), dtype=bool)
     quotas = Quotas.of(floors, reached, scene.requirements.coverage)
-    if quotas.enough(np.any(measured, axis=1)):
-        return True
-    lit, seen = measured_of(scene, projectors, candidates, fresh)
-    return candidate_cover(scene, seen, lit, candidates.cameras).enough(chosen)
+    return quotas.enough(np.any(measured, axis=1))
 
 
 def measured_samples(

@@ -440,7 +440,7 @@ def test_what_is_enough_of_all_that_is_lit_is_enough(ball, coarse):
             part = min(part, 1.0)
             required = replace(scene.requirements, coverage=part)
             other = replace(scene, requirements=required)
-            surely = _surely_enough(other, projectors, few, fresh)
+            surely = _surely_enough(other, projectors, few.cameras, fresh)
             among = candidate_cover(other, measured, lit, cover.candidates.cameras)
             assert surely == (share >= part)
             told.add((surely, among.enough(chosen)))
