@@ -29,7 +29,7 @@ from .outlines import Outlines
 from .sphere_cells import Cells
 
 # Pixels from the middle to the rim of the cap, and beyond it.
-_CAP, _BEYOND = 60, 4
+_CAP, _BEYOND = 100, 4
 # Half a pixel's diagonal, and how far apart directions along an outline are drawn [px].
 _HALF, _STEP = 0.5**0.5, 0.9
 # Shares of the size of the mesh: of faces within these, outlines are drawn alone too.
