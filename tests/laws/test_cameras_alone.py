@@ -283,3 +283,18 @@ def test_bodies_and_standing_devices_are_refused(ball, tmp_path):
         path.write_text(RIG + more)
         with pytest.raises(InputError, match=words):
             plan_rig(ball, load_rig(str(path)), **ASKED)
+
+
+def test_obstacles_stand_in_the_way_and_the_audit_confirms_the_plan(
+    ball, tmp_path, monkeypatch
+):
+    work_little(monkeypatch)
+    prove_little(monkeypatch)
+    path = tmp_path / "bench.toml"
+    path.write_text(
+        f'{RIG}\n[[obstacle]]\nname = "bench"\nshape = "table"\n'
+        "size_mm = [600, 600, 30]\n"
+    )
+    plan = plan_rig(ball, load_rig(str(path)), **ASKED)
+    assert [one.name for one in plan.document.rig.obstacle] == ["bench"]
+    assert audit_plan(plan, threads=1).failures == ()
