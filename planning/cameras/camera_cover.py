@@ -137,28 +137,32 @@ def confirmed_cover(
             return cover
         fresh = scene.target_samples(DRAWS.fresh_cameras.later(attempt))
         chosen = cover.selection.chosen
-        if confirms(scene, projectors, cover.candidates, chosen, fresh):
+        seen = denial(scene, projectors, cover.candidates, chosen, fresh)
+        if seen is None:
             return cover
-        _, seen = measured_of(scene, projectors, cover.candidates, fresh)
         target = merged(target, fresh)
         samples = lit_samples(scene, projectors, target)
         measured = np.concatenate([measured, seen[:, : len(candidates.cameras)]])
     return choose(samples, measured)
 
 
-def confirms(
+def denial(
     scene: Scene,
     projectors: Sequence[PlannedProjector],
     candidates: CandidateViews,
     chosen: NDArray[np.int64],
     fresh: Target,
-) -> bool:
-    """Return whether chosen candidates measure enough of samples that are fresh."""
+) -> NDArray[np.bool_] | None:
+    """Return which candidate measures which of fresh samples that are lit, (n, m).
+
+    None where the chosen ones measure enough of them.
+    """
     cameras = tuple(candidates.cameras[i] for i in chosen)
     if _surely_enough(scene, projectors, cameras, fresh):
-        return True
+        return None
     lit, seen = measured_of(scene, projectors, candidates, fresh)
-    return candidate_cover(scene, seen, lit, candidates.cameras).enough(chosen)
+    cover = candidate_cover(scene, seen, lit, candidates.cameras)
+    return None if cover.enough(chosen) else seen
 
 
 def _surely_enough(

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +14,9 @@ from planning.scene.bodies.clearance import with_clearance
 from planning.scene.draws import DRAWS
 from planning.scene.measured import measured_by, taken
 from planning.scene.scene import Scene
-from planning.scene.workspace.model_candidates import one_of_each
+from planning.scene.workspace.model_candidates import ModelCandidates, one_of_each
 
-from .camera_cover import CameraCover, candidate_cover, confirms
+from .camera_cover import CameraCover, candidate_cover, denial
 from .camera_routes import cover_by_cover
 from .proved_cameras import CameraStage, camera_stage
 
@@ -41,12 +42,16 @@ class CameraOffer:
         found = self.found
         return candidate_cover(self.scene, found.measured, found.samples, self.known)
 
+    @cached_property
+    def _offer(self) -> ModelCandidates[PlannedCamera]:
+        return self.scene.candidates(one_of_each(self.known))
+
     def around(
         self, device: PlannedCamera, n_lattice: int, scale: float
     ) -> tuple[PlannedCamera, ...]:
         """Return poses around one."""
-        offer = self.scene.candidates(one_of_each(self.known))
-        return with_clearance(self.scene, offer.around((device,), n_lattice, scale))
+        between = self._offer.around((device,), n_lattice, scale)
+        return with_clearance(self.scene, between)
 
     def covers(
         self, devices: Sequence[PlannedCamera], samples: NDArray[np.int64]
@@ -60,7 +65,7 @@ class CameraOffer:
         fresh = self.scene.target_samples(DRAWS.fresh_cameras.later(draw))
         chosen = len(self.known) + np.arange(len(devices))
         offered = self.found.candidates.joined(devices)
-        return confirms(self.scene, self.projectors, offered, chosen, fresh)
+        return denial(self.scene, self.projectors, offered, chosen, fresh) is None
 
 
 def has_room(stage: CameraStage) -> bool:
@@ -90,8 +95,8 @@ def one_camera_fewer(
     found = free_devices(offer, proof.needed.count - 1, starts)
     if not found:
         return None
-    known = np.arange(proof.given)
-    known = np.append(known, len(offer.known) + np.arange(len(found)))
+    joined = len(offer.known) + np.arange(len(found))
+    known = np.append(np.arange(proof.given), joined)
     candidates = cover.candidates.joined(found)
     again = cover_by_cover(scene, projectors, candidates, known)
     needed = again.selection.needed

@@ -8,6 +8,7 @@ fitted to its samples, so fresh ones must confirm it.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
@@ -132,6 +133,10 @@ class _Moves(Generic[_D]):
     cover: CandidateCover
     rng: np.random.Generator
 
+    @cached_property
+    def _reached(self) -> _Mask:
+        return np.any(self.cover.covers, axis=1)
+
     def moved(self, poses: _Poses[_D]) -> tuple[_Poses[_D], bool]:
         """Return poses where none is better near by, and if fresh samples agree."""
         scale, attempt = _FARTHEST, 0
@@ -188,8 +193,7 @@ class _Moves(Generic[_D]):
         """
         cover = self.cover
         regions = cover.regions or RegionFloors.none(len(covered))
-        reached = np.any(cover.covers, axis=1) | covered
-        quotas = Quotas.of(regions, reached, cover.share)
+        quotas = Quotas.of(regions, self._reached | covered, cover.share)
         quotas = replace(quotas, total=int(np.ceil((1.0 + spare) * quotas.total)))
         counts = quotas.regions.counts(covered)[:, None]
         return float(missed_shares(quotas, counts)[0])
