@@ -9,14 +9,20 @@ from support.little_work import work_little
 from geometry.poses import look_at
 from geometry.shapes.primitives import sphere
 from planning import plan_rig
-from planning.cameras.camera_cover import camera_candidate_views, plan_cameras
+from planning.cameras.camera_cover import (
+    camera_candidate_views,
+    denial,
+    measured_of,
+    plan_cameras,
+)
 from planning.cameras.free_cameras import CameraOffer, has_room, one_camera_fewer
 from planning.cameras.proved_cameras import bound_stage, camera_stage
 from planning.model.bodies import Existing
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs import camera_bound
 from planning.proofs.all_poses import Effort
-from planning.proofs.moved_poses import free_devices
+from planning.proofs.moved_poses import _Moves, free_devices
+from planning.proofs.selection import CandidateCover
 from planning.rig.rig import Rig, load_rig
 from planning.scene.draws import DRAWS
 from planning.scene.lights import ring_frame
@@ -136,3 +142,24 @@ def test_a_plan_takes_fewer_cameras_than_its_candidates_need(monkeypatch):
     assert with_.needed.count < without.needed.count
     assert with_.candidates.n_candidates > without.candidates.n_candidates == 14
     assert "one moved at a time" in with_.routes.why
+
+
+def test_fresh_samples_deny_cameras_that_measure_too_little_of_them():
+    scene, stage = staged(40)
+    candidates, chosen = stage.cover.candidates, stage.cover.selection.chosen
+    fresh = scene.target_samples(DRAWS.fresh_cameras.later(91))
+    given = scene, PROJECTORS, candidates
+    assert denial(*given, chosen, fresh) is None
+    seen = denial(*given, chosen[:1], fresh)
+    np.testing.assert_array_equal(seen, measured_of(*given, fresh)[1])
+
+
+def test_what_poses_cover_beside_the_known_ones_is_required_too():
+    known = np.zeros((10, 1), dtype=bool)
+    known[:4] = True
+    moves = _Moves(None, CandidateCover(known, 1.0), np.random.default_rng(0))
+    covered = np.arange(10) < 6
+    assert moves.missed(covered) == 0.0
+    covered[0] = False
+    # Six are required then, and five of them covered.
+    assert abs(moves.missed(covered) - 1.0 / 6.0) < 1e-12
