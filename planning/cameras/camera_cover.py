@@ -155,33 +155,28 @@ def denial(
 ) -> NDArray[np.bool_] | None:
     """Return which candidate measures which of fresh samples that are lit, (n, m).
 
-    None where the chosen ones measure enough of them.
+    None where the chosen ones measure enough of them. No more is reached than is lit,
+    so most often no candidate has to be looked at.
     """
     cameras = tuple(candidates.cameras[i] for i in chosen)
-    if _surely_enough(scene, projectors, cameras, fresh):
-        return None
-    lit, seen = measured_of(scene, projectors, candidates, fresh)
-    cover = candidate_cover(scene, seen, lit, candidates.cameras)
-    return None if cover.enough(chosen) else seen
-
-
-def _surely_enough(
-    scene: Scene,
-    projectors: Sequence[PlannedProjector],
-    cameras: tuple[PlannedCamera, ...],
-    target: Target,
-) -> bool:
-    """Return whether what is measured is enough, whatever other candidates reach.
-
-    They reach no more than is lit, so most often none has to be looked at.
-    """
-    lit, measured = measured_of(
-        scene, projectors, CandidateViews(scene, cameras), target
-    )
+    views = CandidateViews(scene, cameras)
+    lit, own = measured_of(scene, projectors, views, fresh)
+    covered = np.any(own, axis=1)
     floors = RegionFloors.of(scene, lit.target, "camera")
-    reached = np.ones(len(lit.target), dtype=bool)
-    quotas = Quotas.of(floors, reached, scene.requirements.coverage)
-    return quotas.enough(np.any(measured, axis=1))
+
+    def enough(reached: NDArray[np.bool_]) -> bool:
+        return Quotas.of(floors, reached, scene.requirements.coverage).enough(covered)
+
+    if enough(np.ones(len(covered), dtype=bool)):
+        return None
+    # What they measure is reached: candidates are asked for the rest alone.
+    missed = np.flatnonzero(~covered)
+    rest = measured_of(scene, projectors, candidates, lit.target.take(missed))[1]
+    reached = covered.copy()
+    reached[missed] = np.any(rest, axis=1)
+    if enough(reached):
+        return None
+    return measured_of(scene, projectors, candidates, fresh)[1]
 
 
 def measured_samples(

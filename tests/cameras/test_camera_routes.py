@@ -19,9 +19,9 @@ from planning import RigPlan
 from planning.cameras.baselines.widest_baselines import WidestBaselines
 from planning.cameras.camera_baselines import baseline_samples, held_to_candidates
 from planning.cameras.camera_cover import (
-    _surely_enough,
     camera_candidate_views,
     candidate_cover,
+    denial,
     measured_of,
 )
 from planning.cameras.camera_routes import (
@@ -425,25 +425,24 @@ def test_routes_that_are_no_claim_break_the_plan(change):
         _failures(TRUE | change)
 
 
-def test_what_is_enough_of_all_that_is_lit_is_enough(ball, coarse):
-    """Whatever candidates reach; what isn't so may be enough of what they reach."""
+def test_fresh_samples_deny_what_all_candidates_would(ball, coarse):
+    """Whether chosen ones are enough is asked of few, and is what all would tell."""
     (scene, projectors, _), cover = ball, coarse[0]
     fresh = scene.target_samples(DRAWS.fresh_cameras)
     lit, measured = measured_of(scene, projectors, cover.candidates, fresh)
     reached, told = measured.any(axis=1).mean(), set[tuple[bool, bool]]()
     for k in range(1, 1 + len(cover.cameras)):
         chosen = cover.selection.chosen[:k]
-        few = replace(cover, selection=replace(cover.selection, chosen=chosen))
         share = measured[:, chosen].any(axis=1).mean()
         # Enough of all, of what is reached alone, and of neither.
         for part in (0.99 * share, share * (1.0 + 1.0 / reached) / 2.0, 1.01 * share):
             part = min(part, 1.0)
             required = replace(scene.requirements, coverage=part)
             other = replace(scene, requirements=required)
-            surely = _surely_enough(other, projectors, few.cameras, fresh)
+            seen = denial(other, projectors, cover.candidates, chosen, fresh)
             among = candidate_cover(other, measured, lit, cover.candidates.cameras)
-            assert surely == (share >= part)
-            told.add((surely, among.enough(chosen)))
-    assert (True, False) not in told
+            assert (seen is None) == among.enough(chosen)
+            assert seen is None or np.array_equal(seen, measured)
+            told.add((share >= part, seen is None))
     assert {(True, True), (False, False)} <= told
     assert (False, True) in told or reached == 1.0
