@@ -8,16 +8,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from planning.model.document.certificates import CamerasBy
 from planning.model.document.ring_records import AxisTaken, RingAxis
 from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.proofs.selection import fewest_count
 from planning.rings.acquisition import pixels_read
 from planning.rings.axis_moves import move_ring_axes
 from planning.rings.centred_axes import centred_axes
 from planning.rings.idle_rings import without_idle
 from planning.scene.camera_views import CandidateViews
-from planning.scene.measured import lit_samples
+from planning.scene.measured import LitSamples, lit_samples
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from solvers.covers.cover import solve_cover
@@ -27,6 +29,7 @@ from .camera_cover import (
     NothingMeasuredError,
     candidate_cover,
     measured_of,
+    measured_samples,
     n_fixed,
 )
 from .camera_stage import (
@@ -58,33 +61,62 @@ def place_for_axes(
     """
     if axis is None or axis == "free":
         return place_cameras(scene, projectors, candidates, by, axis)
-    middle = centred_axes(scene, projectors, margin)
+    middle, free = centred_axes(scene, projectors, margin), None
     try:
+        if axis == "auto" and by != "paper":
+            needed = _needed_by_more(scene, middle, candidates)
+            if needed is not None:
+                free = cover_axes(scene, projectors, candidates, by, "free")
+                if _burden(free)[:2] < (False, needed):
+                    return by_better_route(scene, free, by)
         taken = cover_axes(scene, middle, candidates, by, "centred")
     except NothingMeasuredError:
         if axis == "centred":
             raise
         return place_cameras(scene, projectors, candidates, by)
-    if axis == "auto" and not no_axes_need_fewer(scene, taken.cover):
+    if axis == "auto" and free is None and not no_axes_need_fewer(scene, taken.cover):
         free = cover_axes(scene, projectors, candidates, by, "free")
-        taken = min(taken, free, key=_burden)
+    taken = taken if free is None else min(taken, free, key=_burden)
     return by_better_route(scene, taken, by)
 
 
-def no_axes_need_fewer(scene: Scene, cover: CameraCover) -> bool:
-    """Return whether the requirement is met, and by no fewer candidates of any axes.
+def _needed_by_more(
+    scene: Scene, projectors: Sequence[PlannedProjector], candidates: CandidateViews
+) -> int | None:
+    """Return how many candidates measure enough, unless other axes need no fewer.
 
-    Whatever a camera measures it sees: no cover of what is seen with fewer cameras
-    bounds those of all ring axes, for as many samples measured.
+    Which ones, and whether fresh samples confirm them, is left to who takes them.
     """
+    samples, measured = measured_samples(scene, projectors, candidates)
+    cover = candidate_cover(scene, measured, samples, candidates.cameras)
+    needed = fewest_count(cover)
+    proved = _seen_bound(scene, candidates, samples, measured) >= needed
+    return None if proved and needed <= cover.most else needed
+
+
+def no_axes_need_fewer(scene: Scene, cover: CameraCover) -> bool:
+    """Return whether the requirement is met, and by no fewer candidates of any axes."""
     if cover.selection.status == "infeasible":
         return False
-    seen = cover.candidates.seen(cover.samples.target)
-    seen &= np.any(cover.measured, axis=1)[:, None]
-    cameras = cover.candidates.cameras
-    problem = candidate_cover(scene, seen, cover.samples, cameras).problem
-    bound = solve_cover(problem, seed=scene.seed)
-    return bound.lower_bound >= len(cover.cameras)
+    bound = _seen_bound(scene, cover.candidates, cover.samples, cover.measured)
+    return bound >= len(cover.cameras)
+
+
+def _seen_bound(
+    scene: Scene,
+    candidates: CandidateViews,
+    samples: LitSamples,
+    measured: NDArray[np.bool_],
+) -> float:
+    """Return the least candidates, for as many samples measured, whatever the axes.
+
+    Whatever a camera measures it sees: no cover of what is seen with fewer cameras
+    bounds those of all ring axes.
+    """
+    seen = candidates.seen(samples.target)
+    seen &= np.any(measured, axis=1)[:, None]
+    problem = candidate_cover(scene, seen, samples, candidates.cameras).problem
+    return solve_cover(problem, seed=scene.seed).lower_bound
 
 
 def standing_axes(

@@ -18,6 +18,7 @@ from solvers.covers.bounds.lagrangian import tighten
 from solvers.covers.bounds.mixed_integer import TOLERANCE, branch_and_bound, fits
 from solvers.covers.bounds.reduced_cover import ReducedCover
 from solvers.covers.bounds.relaxation import coverage_bounds, rounding
+from solvers.covers.exact.floored_pairs import least_lacking
 from solvers.covers.exact.group_branching import best_by_groups
 from solvers.covers.exact.pairs import best_pair
 from solvers.covers.search.neighbourhood import (
@@ -150,6 +151,14 @@ def _of_floored(
     best = free.selected
     if np.all(cover.covered_by(best) >= cover.quotas):
         return free
+    if (few := least_lacking(cover, n_sets, budget)) is not None:
+        weight, proof = (
+            cover.weight_of(few),
+            f"{exact_search(n_sets)[1]}, {FLOORS_COUNTED}",
+        )
+        if cover.meets(few):
+            return Answer(SolveStatus.OPTIMAL, few, weight, proof, free.bound)
+        return Answer(SolveStatus.FEASIBLE, few, free.bound, free.proof, free.bound)
     part = budget.part(0.4 * budget.remaining)
     for first in (best, greedy(cover, start, budget, n_sets=n_sets)):
         lacks_less, prices = least_shortage(cover, first, part, seed)

@@ -1,5 +1,6 @@
 """Floors of row sets beside what is required of all: brute force and known answers."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,8 @@ from solvers.covers.bounds.mixed_integer import branch_and_bound
 from solvers.covers.bounds.reductions import reduce_problem
 from solvers.covers.bounds.relaxation import cost_bound, count_bound, least_service
 from solvers.covers.cover import solve_max_coverage
-from solvers.covers.search.prices import Prices
+from solvers.covers.exact.floored_pairs import least_lacking
+from solvers.covers.search.prices import Prices, lack
 from solvers.status import WorkBudget
 
 
@@ -79,6 +81,17 @@ def test_counts_and_weights_equal_brute_force(seed):
         assert cost_bound(cover, lam) <= needed - problem.fixed.size + 1e-9
     exact = branch_and_bound(cover, np.arange(cover.n_sets), WorkBudget(1e12))
     assert exact.bound == pytest.approx(needed - problem.fixed.size, abs=1e-4)
+
+
+@pytest.mark.parametrize("seed", range(9))
+def test_pairs_that_lack_least_are_those_of_brute_force(seed):
+    cover = reduce_problem(floored(seed, n_e=40, n_s=12))
+    for n_sets in (1, 2):
+        found = least_lacking(cover, n_sets, WorkBudget(1e9))
+        tuples = itertools.combinations_with_replacement(range(cover.n_sets), n_sets)
+        least = min(lack(cover, np.unique(sets)) for sets in tuples)
+        assert lack(cover, found) == least
+    assert least_lacking(cover, 3, WorkBudget(1e9)) is None
 
 
 @pytest.mark.parametrize("seed", range(6))
