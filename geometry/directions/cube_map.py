@@ -8,7 +8,7 @@ joins cells four by four.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -124,7 +124,7 @@ class CubeMap:
         inner = (i > 0) & (i < n) & (j > 0) & (j < n)
         border = np.flatnonzero(~inner)
         # What is nearest to it lies in a cell of half the width that it is a corner of.
-        own = 2.0 * float(CubeMap(2 * n).radii.max()) + self.corner_clearance
+        own = 2.0 * float(cube_map(2 * n).radii.max()) + self.corner_clearance
         corners = self.corners.reshape(-1, 3)[border]
         kept = self._within(corners, np.full(border.size, own))
         face, rest = np.divmod(np.arange(inner.size), (n + 1) ** 2)
@@ -168,6 +168,12 @@ class CubeMap:
             for axis, value in zip(_AXES[face], (x, y, _SIGNS[face]), strict=True):
                 directions[face, :, :, axis] = value / length
         return directions
+
+
+@cache
+def cube_map(n: int) -> CubeMap:
+    """Return the map of n cells an edge, whose neighbourhoods are found once."""
+    return CubeMap(n)
 
 
 def located(directions: Array, n: Ints | int) -> Ints:

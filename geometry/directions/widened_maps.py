@@ -10,7 +10,7 @@ import numpy as np
 
 from geometry.arrays import Array, Ints, Mask, Words
 
-from .cube_map import CubeMap, located, nearest_corner
+from .cube_map import CubeMap, cube_map, located, nearest_corner
 
 # Rounds of widening: the finest map, then the others.
 _FINEST = (1, 2, 3)
@@ -39,7 +39,7 @@ class WidenedMaps:
                     cells.append(cube.n)
             if cube.n <= 2:
                 break
-            rows, cube, rounds = cube.halved(rows), CubeMap(cube.n // 2), _COARSER
+            rows, cube, rounds = cube.halved(rows), cube_map(cube.n // 2), _COARSER
         self._angles, self._cells = np.array(angles), np.array(cells)
         # All maps one below the other, so that one look answers from all of them.
         self._rows = np.concatenate(made).view(np.uint8)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from geometry.arrays import lengths
 from geometry.devices import PinholeModel
-from geometry.directions.cube_map import CubeMap
+from geometry.directions.cube_map import cube_map
 from geometry.directions.open_directions import DirectionLimits
 from geometry.directions.widened_maps import WidenedMaps
 from planning.proofs.cells.aim_cells import AimTree
@@ -145,7 +145,7 @@ def camera_trees(
 
 def _shadow_maps(scene: Scene, samples: Target, finest: int) -> WidenedMaps:
     """Directions that are open to samples; incidence is cameras' only limit of them."""
-    cube = CubeMap(1 << finest)
+    cube = cube_map(1 << finest)
     limits = DirectionLimits(scene.requirements.camera.max_incidence, 0.0)
     near = scene.requirements.workspace.camera_radius_m[0]
     opened = open_samples(scene, limits, samples, cube, shadows=True, nearest_m=near)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import ParallelModel
-from geometry.directions.cube_map import CubeMap
+from geometry.directions.cube_map import CubeMap, cube_map
 from geometry.directions.open_directions import DirectionLimits
 from geometry.directions.widened_maps import WidenedMaps
 from planning.model.planned import PlannedProjector
@@ -76,7 +76,7 @@ def bound_projectors(
     shadows = shadows and bool(depth >= reach)
 
     def searched(effort: Effort, *, shadows: bool) -> tuple[CellBound, _Tree]:
-        cube = CubeMap(1 << effort.maps)
+        cube = cube_map(1 << effort.maps)
         required = scene.requirements.projector
         limits = DirectionLimits(required.max_incidence, required.min_tangent_angle)
         opened = open_samples(

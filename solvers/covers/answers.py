@@ -17,6 +17,7 @@ from solvers.status import SolveStatus, WorkBudget
 NONE = np.empty(0, dtype=np.int64)
 INTEGER_PROOF = "branch and bound (HiGHS)"
 FLOORS_COUNTED = "floors counted"
+HARDEST = "of the floor that takes most"
 IN_STOCK = "Lagrangian bound, stock counted"
 
 

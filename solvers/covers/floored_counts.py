@@ -19,9 +19,12 @@ from solvers.covers.search.neighbourhood import better, greedy, prune
 from solvers.covers.search.prices import Prices, lack, least_shortage, tightest
 from solvers.status import SolveStatus, WorkBudget
 
-from .answers import FLOORS_COUNTED, INTEGER_PROOF, NONE, Answer
+from .answers import FLOORS_COUNTED, HARDEST, INTEGER_PROOF, NONE, Answer
 from .counts import fewest_sets
 from .heaviest import closed, group_proof
+
+# Share of the work on the total by itself; where a floor takes more sets than it.
+_TOTAL_ALONE = (0.5, 0.1)
 
 
 def fewest_with_floors(
@@ -36,35 +39,65 @@ def fewest_with_floors(
 
     But for floors it is simple. All sets together meet the requirement.
     """
-    alone, part = cover.without_floors, budget.part(0.5 * budget.units)
+    alone, floor = cover.without_floors, _hardest(cover, budget)
+    most = greedy(alone, NONE, budget).size
+    # What floors ask for alone, the total's proof needn't know.
+    share = _TOTAL_ALONE[greedy(floor, NONE, budget).size > most]
+    part = budget.part(share * budget.units)
     found = fewest_sets(alone, part, seed=seed, heaviest=False)
     # Of nothing that is lacking the search takes one set all the same.
     total_bound = found.bound if alone.required > 0 else 0.0
     if not cover.meets(found.selected):
-        selected, prices = _from_above(cover, found.selected, budget, seed)
+        part = budget.part(0.2 * budget.remaining)
+        hardest = fewest_sets(floor, part, seed=seed, heaviest=False)
+        if hardest.bound > found.bound:
+            proof = f"{hardest.proof}, {HARDEST}"
+            found = replace(found, bound=hardest.bound, proof=proof)
+        starts = found.selected, hardest.selected
+        selected, prices = _from_above(cover, starts, budget, seed)
         found = replace(found, status=SolveStatus.FEASIBLE, selected=selected)
         found = _from_below(cover, found, prices, budget)
     found = closed(cover, found, budget, seed, max_sets, heaviest=heaviest)
     return replace(found, total_bound=total_bound)
 
 
+def _hardest(cover: ReducedCover, budget: WorkBudget) -> ReducedCover:
+    """Return the row set whose floor by itself takes most sets, greedily."""
+    alone = (cover.of_row_set(g) for g in np.flatnonzero(cover.quotas))
+    by_count = {greedy(one, NONE, budget).size: one for one in alone}
+    return by_count[max(by_count)] if by_count else cover.without_floors
+
+
 def _from_above(
-    cover: ReducedCover, free: NDArray[np.int64], budget: WorkBudget, seed: int
+    cover: ReducedCover,
+    starts: tuple[NDArray[np.int64], NDArray[np.int64]],
+    budget: WorkBudget,
+    seed: int,
 ) -> tuple[NDArray[np.int64], list[Prices]]:
-    """Return few sets that meet all, and prices at which fewer were looked for."""
-    few = prune(cover, greedy(cover, NONE, budget))
+    """Return few sets that meet all, and prices at which fewer were looked for.
+
+    From sets that meet the total, and such that meet the hardest floor.
+    """
+    free, hard = starts
+    begun = (prune(cover, greedy(cover, first, budget)) for first in (NONE, hard))
+    few, least = min(begun, key=len), max(free.size, hard.size)
     prices = [Prices.even(cover)]
-    for count in range(free.size, few.size):
-        part = budget.part(0.2 * budget.remaining)
+    # Halving the gap: what fails costs all its work, and most counts between do fail
+    # where floors ask for many more sets than the total does.
+    while least < few.size:
+        count = (least + few.size) // 2
+        part = budget.part(0.3 * budget.remaining)
         shorter = few
         while shorter.size > count:
             without = [np.delete(shorter, i) for i in range(shorter.size)]
             shorter = min(without, key=lambda s: lack(cover, s))
         filled = greedy(cover, free, budget, n_sets=count)
-        for start in (filled, shorter):
-            selected, prices = least_shortage(cover, start, part, seed)
-            if cover.meets(selected):
-                return prune(cover, selected), prices
+        start = min(shorter, filled, key=lambda s: lack(cover, s))
+        selected, prices = least_shortage(cover, start, part, seed, enough=True)
+        if cover.meets(selected):
+            few = prune(cover, selected)
+        else:
+            least = count + 1
     return few, prices
 
 

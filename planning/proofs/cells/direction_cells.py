@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.directions.cube_map import FACES, CubeMap, middles, quarters
+from geometry.directions.cube_map import FACES, CubeMap, cube_map, middles, quarters
 from geometry.directions.open_directions import DirectionLimits, OpenDirections
 from geometry.directions.silhouettes import POINTS
 from planning.scene.samples import Target
@@ -45,7 +45,7 @@ class DirectionTree:
         levels = [leaves]
         while len(levels[-1]) > FACES:
             n = round((len(levels[-1]) // FACES) ** 0.5)
-            levels.append(CubeMap(n).halved(levels[-1]))
+            levels.append(cube_map(n).halved(levels[-1]))
         return cls(tuple(levels[::-1]), n_rows)
 
     @property

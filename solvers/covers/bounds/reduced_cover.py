@@ -71,6 +71,20 @@ class ReducedCover:
         one = np.zeros(self.weights.size, dtype=np.int64)
         return replace(self, row_sets=one, quotas=np.array([self.quota]), quota=0.0)
 
+    def of_row_set(self, g: int) -> "ReducedCover":
+        """The same sets with one row set alone, and what that requires."""
+        rows = np.flatnonzero(self.row_sets == g)
+        return replace(
+            self,
+            by_set=self.by_set[:, rows],
+            by_row=self.by_row[rows],
+            weights=self.weights[rows],
+            needs=self.needs[rows],
+            row_sets=np.zeros(rows.size, dtype=np.int64),
+            quotas=self.quotas[[g]],
+            quota=0.0,
+        )
+
     @cached_property
     def limited(self) -> bool:
         """Whether there are more sets of a kind than its stock holds."""

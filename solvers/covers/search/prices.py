@@ -84,12 +84,18 @@ class Prices:
 
 
 def least_shortage(
-    cover: ReducedCover, start: NDArray[np.int64], budget: WorkBudget, seed: int
+    cover: ReducedCover,
+    start: NDArray[np.int64],
+    budget: WorkBudget,
+    seed: int,
+    *,
+    enough: bool = False,
 ) -> tuple[NDArray[np.int64], list[Prices]]:
     """Return as many sets that lack least, of these most weight; and prices tried.
 
     Prices rise until floors are met, then halve the way back: too high, they cost
-    weight that the floors don't ask for.
+    weight that the floors don't ask for. Any sets that meet all will do if that is
+    `enough`.
     """
     best = selected = start
     low, high = Prices.even(cover), None
@@ -102,7 +108,7 @@ def least_shortage(
             low = tried[-1]
         prices = low.raised(lacking) if high is None else low.between(high)
         same = any(np.array_equal(prices.of_sets, p.of_sets) for p in tried)
-        if same or budget.exhausted:
+        if same or budget.exhausted or (enough and attempt and cover.meets(best)):
             break
         tried.append(prices)
         selected = most_coverage(
