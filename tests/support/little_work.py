@@ -4,6 +4,7 @@ import os
 import sys
 from dataclasses import replace
 
+from geometry.repair import hollow
 from planning.cameras import camera_baselines
 from planning.cameras.paper import hole_closing
 from planning.projectors import share_margin
@@ -11,6 +12,7 @@ from planning.proofs import camera_bound, marginals, projector_bound
 from planning.rig.rig import Rig
 from planning.scene.draws import DRAWS
 from planning.verify.audit.audit_case import examine
+from planning.verify.audit.coverage import inside_claims
 
 # Of the work on bounds over all poses, which most plans spend most of their time on.
 _SHARE = 0.1
@@ -26,6 +28,12 @@ _FEW = {
 }
 # Fresh samples that an audit looks at where its caller doesn't say how many.
 _AUDITED = 4000
+# Spots that tell hollow from solid, what the audit then reckons with, and its own.
+_LOOKING = (
+    (hollow, "_SPOTS", 4000),
+    (inside_claims, "_PLANNER_SPOTS", 3000),
+    (inside_claims, "_MAX_SAMPLES", 1500),
+)
 # Poses offered: a rig file can ask for no fewer than 600 and 400.
 _POSES = {"n_projector_poses": 160, "n_camera_poses": 120}
 # Samples that devices and rings are fitted to, and that confirm them, where a plan is
@@ -60,6 +68,8 @@ def work_little(patch, *, every_pose=False):
     And few poses be offered, unless `every_pose`.
     """
     draw_fewer(patch, **_FEW)
+    for module, name, count in _LOOKING:
+        patch.setattr(module, name, count)
     bound_roughly(patch)
     search_briefly(patch)
     patch.setitem(examine.__kwdefaults__, "n_samples", _AUDITED)

@@ -4,11 +4,15 @@ import json
 import signal
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
+import pytest
 from click.testing import CliRunner
 
 from planning.cli.main import commands
+from planning.cli.plans import saved_plans
+from planning.report.drawing.rig_picture import draw_rig
 
 RIG = """
 base = "default"
@@ -22,6 +26,9 @@ n_candidate_cameras = 40
 n_reference_projectors = 600
 n_reference_cameras = 400
 """
+
+# The smallest there is: these runs are of plans.
+_PICTURE = (800, 500)
 
 
 @dataclass(frozen=True)
@@ -50,6 +57,7 @@ def run(mesh: Path, folder: Path, words: Sequence[str] = ()) -> Ended:
     command += [
         "--no-check",
         "--no-report",
+        "--no-patterns",
         "--quiet",
         "--threads",
         "1",
@@ -62,7 +70,9 @@ def run(mesh: Path, folder: Path, words: Sequence[str] = ()) -> Ended:
     before = signal.getsignal(signal.SIGINT)
     try:
         # A bug would be reported as one line and 70: with --debug it is raised.
-        result = CliRunner().invoke(commands, command)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(saved_plans, "draw_rig", partial(draw_rig, size=_PICTURE))
+            result = CliRunner().invoke(commands, command)
     finally:
         signal.signal(signal.SIGINT, before)
     if result.exception is not None and not isinstance(result.exception, SystemExit):
