@@ -54,8 +54,6 @@ _BARRIERS = (
     {"ipopt.mu_strategy": "adaptive", "ipopt.mu_oracle": "loqo"},
     {"ipopt.mu_strategy": "monotone"},
 )
-# MUMPS spends a third less on these small systems by approximate minimum degree.
-_AMD = 0
 # How far a camera turns about its axis within one program [rad].
 _MAX_TURN = 0.5
 
@@ -124,9 +122,6 @@ def _run_ipopt(
         SILENT
         | barrier
         | {
-            "ipopt.mumps_pivot_order": _AMD,
-            # Permuted, a matrix of duals that diverge fills up: gigabytes, minutes.
-            "ipopt.mumps_permuting_scaling": 0,
             "ipopt.max_iter": _ITERATIONS[problem.elastic],
             "ipopt.tol": 1e-7,
             "ipopt.acceptable_iter": 0,
