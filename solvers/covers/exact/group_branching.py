@@ -161,11 +161,16 @@ def _table_units(cover: ReducedCover) -> float:
 def likeness(
     covers: NDArray[np.float32], weights: NDArray[np.float64]
 ) -> NDArray[np.float32]:
-    """Return the weighted Jaccard index of each pair of sets, shape (n_s, n_s)."""
+    """Return the weighted Jaccard index of each pair of sets, shape (n_s, n_s).
+
+    1 of two that cover nothing.
+    """
     # Whole numbers below 2^12 for rows: sums are exact, so ties fall alike everywhere.
     scale = max(1.0, float(weights.sum()) / float(1 << 23))
     whole = np.maximum(np.floor(weights / scale), 1.0).astype(np.float32)
     both = (covers * whole) @ covers.T
     alone = both.diagonal()
     either = alone[:, None] + alone[None, :] - both
-    return np.asarray(both / either, dtype=np.float32)
+    alike = np.ones_like(both)
+    np.divide(both, either, out=alike, where=either > 0.0)
+    return alike

@@ -180,3 +180,23 @@ def test_a_floor_that_costs_weight_but_no_set_is_met():
 def test_a_total_must_be_a_weight(total):
     with pytest.raises(ValueError, match="required_total must be finite"):
         CoverProblem(np.ones((2, 2), dtype=bool), required_total=total)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_floor_that_takes_most_sets_leads_and_bounds(seed):
+    """Small rows take many sets, large ones few: what that floor needs, all need."""
+    rng = np.random.default_rng(seed)
+    covers = np.zeros((460, 120), dtype=bool)
+    covers[:60] = rng.random((60, 120)) < 0.05
+    covers[60:] = rng.random((400, 120)) < 0.4
+    row_sets = np.repeat([0, 1], [60, 400])
+    needed = np.floor(0.9 * np.bincount(row_sets, covers.any(axis=1)))
+    alone = solve_cover(CoverProblem(covers[:60], required_weight=needed[0]))
+    assert alone.status is SolveStatus.OPTIMAL
+    problem = CoverProblem(
+        covers, required_weight=needed, required_total=needed.sum(), row_sets=row_sets
+    )
+    solution = solve_cover(problem, budget=3e8)
+    assert meets(problem, solution.selected)
+    assert alone.lower_bound <= solution.lower_bound <= solution.cost
+    assert solution.cost <= alone.cost + 1
