@@ -76,14 +76,12 @@ class AuditCase:
     Attributes:
         shadow: Its surface, as rays meet it.
         actual: What its devices do to the audit's samples.
-        reachable: What reference poses could do.
         seed: Of every random draw.
     """
 
     plan: RigPlan
     shadow: Shadow
     actual: Recomputed
-    reachable: Reachable
     estimator: Estimator
     seed: int
 
@@ -91,6 +89,11 @@ class AuditCase:
     def samples(self) -> AuditSamples:
         """Fresh ones."""
         return self.actual.samples
+
+    @cached_property
+    def reachable(self) -> Reachable:
+        """What reference poses could do, which pixels needn't wait for."""
+        return what_any_could(self.plan, self.actual, self.shadow, self.seed)
 
     @cached_property
     def projectors(self) -> tuple[AuditProjector, ...]:
@@ -165,7 +168,7 @@ class AuditCase:
 def examine(
     plan: RigPlan, *, seed: int, threads: int, n_samples: int = N_SAMPLES
 ) -> AuditCase:
-    """Recompute what a plan's devices and reference poses do to fresh samples."""
+    """Recompute what a plan's devices do to fresh samples."""
     samples = draw_samples(plan.surface, plan.requirements.target, n_samples, seed)
     shadow = Shadow.of(plan, threads=threads)
     actual = what_devices_do(plan, samples, shadow)
@@ -174,5 +177,4 @@ def examine(
     estimator = Estimator(
         samples, plan.coverage.samples, float(areas.sum()), float(target_m2)
     )
-    reachable = what_any_could(plan, actual, shadow, seed)
-    return AuditCase(plan, shadow, actual, reachable, estimator, seed)
+    return AuditCase(plan, shadow, actual, estimator, seed)
