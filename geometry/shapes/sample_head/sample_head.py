@@ -38,7 +38,7 @@ _RELAXATIONS = 30
 _CROWDING = np.array([0.0, -0.45, -0.12])
 # The neck is cut this far above its end, where that is still a plain column, in [mm].
 _COLLAR = 17.0
-_FACE_LIMITS = (500, 1_500_000)
+_FACE_LIMITS = (500, 2_000_000)
 
 
 def sample_head(
@@ -51,7 +51,7 @@ def sample_head(
 
     Args:
         shape: Its proportions; default an average adult.
-        n_faces: Least number of faces, 500 to 1,500,000; the closed mesh has the next
+        n_faces: Least number of faces, 500 to 2,000,000; the closed mesh has the next
             20 n².
         open_neck: Whether the neck ends in an open border, as scans of heads do;
             closed otherwise.

@@ -253,7 +253,7 @@ def test_the_file_at_the_root_is_what_the_generator_writes(tmp_path):
 
 @pytest.mark.parametrize("n_faces", [0, 499, 1_500_001, float("nan")])
 def test_resolution_out_of_range(n_faces):
-    with pytest.raises(MeshError, match="must lie in 500 to 1500000"):
+    with pytest.raises(MeshError, match="must lie in 500 to 2000000"):
         sample_head(n_faces=n_faces)
 
 
