@@ -1,6 +1,7 @@
 """What poses reach of samples, one pose after another on what is still missing."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import groupby, islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,9 @@ from planning.scene.limits.projector_limits import INCIDENCE, LIT
 from planning.scene.measured import LitSamples, measured_by, taken
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
+
+# Cameras that are asked together for what all before them missed.
+_MOST_AT_ONCE = 64
 
 
 def furthest_lit(
@@ -61,12 +65,12 @@ def measured_by_any(
     are lit by.
     """
     measured = np.zeros(len(samples.target), dtype=bool)
-    for camera in cameras:
+    for station, few in _batches(cameras):
         pending = np.flatnonzero(~measured)
         if not len(pending):
             break
-        if camera.station:
-            here = [p for p in lights if p.station == camera.station]
+        if station:
+            here = [p for p in lights if p.station == station]
             target = samples.target.take(pending)
             lit = lighting.lit_stages(scene, here, target) == LIT
             bright = np.flatnonzero(lit.any(axis=1))
@@ -74,5 +78,16 @@ def measured_by_any(
             others = LitSamples.of(here, target.take(bright), lit[bright])
         else:
             others = taken(samples, pending, samples.lit)
-        measured[pending] = measured_by(scene, [camera], others)[:, 0]
+        measured[pending] = measured_by(scene, few, others).any(axis=1)
     return measured
+
+
+def _batches(
+    cameras: Iterable[PlannedCamera],
+) -> Iterator[tuple[str, Sequence[PlannedCamera]]]:
+    """Yield stations with cameras there, ever more at once: the first leave little."""
+    for station, group in groupby(cameras, key=lambda camera: camera.station):
+        size = 1
+        while few := tuple(islice(group, size)):
+            yield station, few
+            size = min(2 * size, _MOST_AT_ONCE)

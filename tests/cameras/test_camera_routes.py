@@ -425,6 +425,17 @@ def test_routes_that_are_no_claim_break_the_plan(change):
         _failures(TRUE | change)
 
 
+def test_what_any_of_many_cameras_measures_is_asked_in_batches(ball, coarse):
+    scene, cover = ball[0], coarse[0]
+    cameras = cover.candidates.cameras
+    assert len(cameras) > 7
+    found = measured_by_any(scene, cameras, cover.samples)
+    assert np.array_equal(found, cover.measured.any(axis=1))
+    # The last one alone measures what it measures, wherever its batch ends.
+    last = measured_by_any(scene, (cameras[0], *cameras[-1:]), cover.samples)
+    assert np.array_equal(last, cover.measured[:, [0, -1]].any(axis=1))
+
+
 def test_fresh_samples_deny_what_all_candidates_would(ball, coarse):
     """Whether chosen ones are enough is asked of few, and is what all would tell."""
     (scene, projectors, _), cover = ball, coarse[0]
