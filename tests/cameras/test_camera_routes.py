@@ -46,6 +46,7 @@ from planning.model.planned import PlannedProjector
 from planning.projectors.projector_stage import plan_projectors
 from planning.proofs.all_poses import Effort
 from planning.proofs.quotas import required_samples
+from planning.report.reach import measured_by_any
 from planning.report.summary.proof_lines import route_lines
 from planning.rig.rig import load_rig
 from planning.rings.ring_radii import uniform_radii
