@@ -200,12 +200,13 @@ def counted(stage: _S, devices: tuple[Any, ...], reachable_m2: float) -> _S:
     """Return a stage with other devices that stand, as many as its cover or more.
 
     Of more than the cover has nothing is proved: they cover what is reachable at most,
-    or what fewer were found to cover where that, of other samples, is more.
+    or what fewer were found to cover where that, of other samples, is more. They are
+    planned for more than what they cover, so that fewer may cover more: what covers of
+    other numbers give isn't what a device less or more would change.
     """
     before, count = stage.certificate, len(devices)
     if count == before.count:
         return replace(stage, by_count=dict(stage.by_count) | {count: devices})
-    kept = {n: some for n, some in stage.by_count.items() if n <= before.count}
     rows = tuple(row for row in before.by_count if row.count <= before.count)
     found = max((row.value_m2 for row in rows), default=0.0)
     reachable_m2 = max(reachable_m2, found)
@@ -224,7 +225,7 @@ def counted(stage: _S, devices: tuple[Any, ...], reachable_m2: float) -> _S:
         # It bounded one fewer than before.
         unknown = before.continuous.changed(one_fewer_upper_bound_m2=None)
         proof = proof.changed(continuous=unknown)
-    return replace(stage, by_count=kept | {count: devices}, certificate=proof)
+    return replace(stage, by_count={count: devices}, certificate=proof)
 
 
 def unsought(cover: CandidateCover) -> Selection:
