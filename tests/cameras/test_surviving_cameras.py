@@ -41,7 +41,7 @@ def plates() -> TriangleMesh:
 
 
 def test_fewer_cameras_are_never_said_to_measure_more(tmp_path, little_work):
-    """Four that measure twice leave out a plate, which three that measure once don't."""
+    """Four that measure twice leave out a plate; three that measure once don't."""
     path = tmp_path / "few.toml"
     path.write_text(RIG)
     plan = plan_rig(
