@@ -9,8 +9,8 @@ the command does, on so few samples and poses that it takes seconds, and verifie
 from the files as `plan verify` does: the audit, figures computed again by the code that
 made them, bounds over candidates; of some the pixels, the bounds over all poses, or the
 whole plan again. A plan is *met* (exit 0) or *short* (exit 1, and says of what); no
-claim of either may be false. What is *refused* is so in one line. Anything else
-escaped: it is listed with its number, and `--only` makes it again. Prints how many
+claim of either may be false. What is *refused* is so in a line for each fault. Anything
+else escaped: it is listed with its number, and `--only` makes it again. Prints how many
 ended how; returns 1 if anything escaped.
 """
 

@@ -126,12 +126,17 @@ def _everywhere(
 def _with_cameras(
     stage: CameraStage, cameras: tuple[PlannedCamera, ...], chosen: _Index
 ) -> CameraStage:
-    """The stage whose cover has other cameras; nothing is proved of these."""
+    """The stage whose cover has other cameras; nothing is proved of these.
+
+    Best covers of other numbers measure once, and may measure more.
+    """
     cover: CameraCover = stage.cover
     covered = int(cover.measured[:, chosen].any(axis=1).sum())
     selection = replace(cover.selection, chosen=chosen, n_covered=covered)
     cover = replace(cover, selection=selection, by_count=None)
-    return replace(stage, cameras=cameras, cover=cover, routes=None, rival=())
+    return replace(
+        stage, by_count={}, cameras=cameras, cover=cover, routes=None, rival=()
+    )
 
 
 @dataclass(frozen=True, eq=False)

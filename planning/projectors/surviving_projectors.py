@@ -69,7 +69,9 @@ def surviving_projectors(
     )
     known, weight = stage.candidates, stage.candidates.samples.samples.weight
     reached = float(known.reached.sum()) * weight
-    return counted(replace(stage, projectors=devices), devices, reached), count
+    # Best covers of other numbers bear no loss, and may light more.
+    taken = replace(stage, by_count={}, projectors=devices)
+    return counted(taken, devices, reached), count
 
 
 def _with_candidates(

@@ -15,13 +15,13 @@ from planning.model.document.certificates import (
     NeededCount,
     OneFewer,
 )
+from planning.scene.placed_bodies import Device, moves_bodies
 
 from .conflicts import Interference, resolve_others
 from .marginals import marginals
 from .selection import CandidateCover, Selection
 
 _ByCount = Mapping[int, NDArray[np.int64]]
-# What a certificate says where chosen devices have bodies.
 _BODIES_LEFT_OUT = "bodies of chosen devices, which only take away"
 
 
@@ -67,7 +67,6 @@ def certified(
             n: (cover.n_covered(c), others.n_covered[n][1]) for n, c in reported.items()
         }
         others = replace(others, by_count=reported, n_covered=covered)
-    bodied = among is not None and among.bodied
     if among is not None:
         others = resolve_others(among, cover, others, len(selection.chosen))
     n_samples, n_candidates = cover.covers.shape
@@ -105,10 +104,15 @@ def certified(
     extras = {
         "given": existing or None,
         "but_for_bodies": selection.but_for_bodies,
-        "bounds_leave_out": _BODIES_LEFT_OUT if bodied else None,
     }
     given = {key: value for key, value in extras.items() if value is not None}
+    given |= bodies_left_out(() if among is None else among.devices)
     return others.by_count, proof.changed(**given)
+
+
+def bodies_left_out(candidates: Sequence[Device]) -> dict[str, str]:
+    """Return `bounds_leave_out` of a certificate; empty where no bodies are chosen."""
+    return {"bounds_leave_out": _BODIES_LEFT_OUT} if moves_bodies(candidates) else {}
 
 
 def least_for_total(by_count: tuple[CountArea, ...], required_m2: float) -> int:
@@ -196,12 +200,13 @@ def counted(stage: _S, devices: tuple[Any, ...], reachable_m2: float) -> _S:
     """Return a stage with other devices that stand, as many as its cover or more.
 
     Of more than the cover has nothing is proved: they cover what is reachable at most,
-    or what fewer were found to cover where that, of other samples, is more.
+    or what fewer were found to cover where that, of other samples, is more. They are
+    planned for more than what they cover, so that fewer may cover more: what covers of
+    other numbers give isn't what a device less or more would change.
     """
     before, count = stage.certificate, len(devices)
     if count == before.count:
         return replace(stage, by_count=dict(stage.by_count) | {count: devices})
-    kept = {n: some for n, some in stage.by_count.items() if n <= before.count}
     rows = tuple(row for row in before.by_count if row.count <= before.count)
     found = max((row.value_m2 for row in rows), default=0.0)
     reachable_m2 = max(reachable_m2, found)
@@ -220,7 +225,7 @@ def counted(stage: _S, devices: tuple[Any, ...], reachable_m2: float) -> _S:
         # It bounded one fewer than before.
         unknown = before.continuous.changed(one_fewer_upper_bound_m2=None)
         proof = proof.changed(continuous=unknown)
-    return replace(stage, by_count=kept | {count: devices}, certificate=proof)
+    return replace(stage, by_count={count: devices}, certificate=proof)
 
 
 def unsought(cover: CandidateCover) -> Selection:

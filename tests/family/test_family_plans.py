@@ -113,6 +113,18 @@ def test_a_member_that_is_short_of_devices_says_what_it_takes(rig, few):
         assert verify_plan(member, check_pixels=False).failures == ()
 
 
+def test_members_say_that_bounds_leave_out_bodies_of_chosen_devices(few, tmp_path):
+    path = tmp_path / "bodied.toml"
+    body = "[camera.body]\nsize_mm = [60, 60, 120]\ncentre_mm = [0, 0, -61]\n"
+    path.write_text(RIG + body)
+    bodied = planned(load_rig(path), [plate(1), plate(-1)])
+    for member in bodied.members:
+        proofs = member.document.certificates
+        assert "bodies of chosen devices" in proofs.cameras.bounds_leave_out
+        assert proofs.projectors.bounds_leave_out == ""
+        assert verify_plan(member, check_pixels=False, threads=1).failures == ()
+
+
 def test_no_plate_is_in_the_way_of_the_other(both):
     for member in both.members:
         areas = member.coverage.target

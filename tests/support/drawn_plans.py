@@ -42,7 +42,8 @@ class _TooLongError(Exception):
 def outcome(job: Job, folder: Path) -> str:
     """Return how a job ends in a folder of its own, in a word and what there is to say.
 
-    `met` and `short` were verified, `refused` was told in one line, else it `escaped`.
+    `met` and `short` were verified; `refused` was told in one line, or in a line of its
+    own for each fault, `where: what`. Else it `escaped`.
     """
     for file, text in job.files.items():
         (folder / file).write_text(text)
@@ -52,9 +53,9 @@ def outcome(job: Job, folder: Path) -> str:
             return _ended(job)
     except (PlanningError, MeshError, click.ClickException) as error:
         # Usage is told by click in other words.
-        told = getattr(error, "message", str(error)).strip()
-        how = "refused" if len(told.splitlines()) == 1 else "escaped: lines"
-        return f"{how}: {told}"
+        faults = getattr(error, "message", str(error)).strip().splitlines()
+        told = len(faults) == 1 or all(": " in fault for fault in faults)
+        return f"{'refused' if told else 'escaped: lines'}: {' | '.join(faults)}"
     except Exception as error:
         traceback.print_exc()
         return f"escaped: {type(error).__name__}: {error}"

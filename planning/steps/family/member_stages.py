@@ -20,7 +20,7 @@ from planning.model.document.certificates import (
 )
 from planning.projectors.candidate_set import CandidateSet
 from planning.projectors.projector_stage import ProjectorStage
-from planning.proofs.candidate_certificate import unsought
+from planning.proofs.candidate_certificate import bodies_left_out, unsought
 from planning.proofs.selection import CandidateCover, Selection, select_fewest
 from planning.report.partial_plan import PartialPlan, Prepared
 from planning.scene.camera_views import CandidateViews
@@ -85,6 +85,7 @@ def _needs(
     own = select_fewest(candidates.cover, known=chosen, budget=_BUDGET)
     weight = candidates.samples.samples.weight
     proof = _certificate(candidates.cover, own, weight)
+    proof = proof.changed(**bodies_left_out(candidates.projectors))
     stage = ProjectorStage({}, proof, partial.projectors, candidates)
     scene = ready.scene.among(partial.projectors)
     cover = candidate_cover(scene, measured, samples, views.cameras)
@@ -95,6 +96,7 @@ def _needs(
         else unsought(cover)
     )
     own_proof = _certificate(cover, fewest, samples.target.samples.weight)
+    own_proof = own_proof.changed(**bodies_left_out(views.cameras))
     return MemberNeeds(
         stage,
         CameraStage(

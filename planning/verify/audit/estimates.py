@@ -39,6 +39,11 @@ class Estimator:
             "target": (self.samples.in_target, self.target_m2),
         }
 
+    @property
+    def n_earned(self) -> int:
+        """Samples of the plan as tolerances count them: stating fewer earns none."""
+        return max(self.n_claimed, _FEWEST_SAMPLES)
+
     def area(self, chosen: Mask) -> float:
         """Return the area that the chosen samples stand for, in [m²]."""
         return float(self.samples.weights[chosen].sum())
@@ -72,8 +77,8 @@ class Estimator:
                 n, k = int(within.sum()), int((chosen & within).sum())
                 variance += self.area(within) ** 2 * _variance(k / n, n)
         if whole_m2 > 0.0:
-            n = max(self.n_claimed, _FEWEST_SAMPLES)
-            variance += whole_m2**2 * _variance(self.area(chosen) / whole_m2, n)
+            share = self.area(chosen) / whole_m2
+            variance += whole_m2**2 * _variance(share, self.n_earned)
         return POINT * whole_m2 + 3.0 * float(np.sqrt(variance))
 
 

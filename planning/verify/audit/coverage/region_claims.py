@@ -18,6 +18,8 @@ from planning.verify.audit.predicates.recompute import light_of_plan
 MARGIN_SLACK = np.radians(2.0)
 # Room for the rounding of a written direction or angle [rad].
 _ANGLE = 1e-4
+# Standard errors that two draws of a share may lie apart.
+_ERRORS = 3.0
 # Share of a region's area whose normals its cone holds.
 _HELD = 0.98
 _SELECTIONS = ("curvature", "faces", "vertex_weight")
@@ -30,7 +32,8 @@ def audit_margins(case: AuditCase, findings: AuditFindings) -> None:
     more than 1 % (and three standard errors) of the assigned area may have a smaller
     margin than claimed, and somewhere in the lit area, of which any sliver may be
     assigned, the margin must be as small, within 2 degrees. There the centroids of all
-    faces of the target help to find the least. A projector with no samples has none.
+    faces of the target help to find the least. A projector with no samples has none;
+    of the audit's more than by chance mustn't be assigned to it then.
     """
     plan, actual = case.plan, case.actual
     within = plan.surface.target_faces(plan.requirements.target)
@@ -42,19 +45,35 @@ def audit_margins(case: AuditCase, findings: AuditFindings) -> None:
         assigned = actual.margins[p, target & (actual.primary == p)]
         lit = both[np.isfinite(both)]
         below = findings.at(f"{projector.id}.min_margin_rad")
-        _audit_margin(projector.min_margin_rad, assigned, lit, below)
+        if projector.min_margin_rad is None:
+            _audit_unassigned(len(assigned), int(target.sum()), case, below)
+        else:
+            _audit_margin(projector.min_margin_rad, assigned, lit, below)
+
+
+def _audit_unassigned(
+    n_assigned: int, n: int, case: AuditCase, findings: AuditFindings
+) -> None:
+    """A sliver of the target may hold samples of the audit and none of the plan's.
+
+    No more of n than three standard errors of the difference of both shares.
+    """
+    error = pooled_error(n_assigned, max(n, 1), 0.0, case.estimator.n_earned)
+    allowed = int(_ERRORS * error * n)
+    findings.holds(
+        n_assigned <= allowed,
+        "",
+        f"None is claimed, but {n_assigned} of {n} samples of the audit are assigned "
+        f"to it, {allowed} may be by chance",
+    )
 
 
 def _audit_margin(
-    claimed: float | None, assigned: Array, lit: Array, findings: AuditFindings
+    claimed: float, assigned: Array, lit: Array, findings: AuditFindings
 ) -> None:
     n = len(assigned)
-    if claimed is None or len(lit) == 0:
-        findings.holds(
-            claimed is None and n == 0,
-            "",
-            f"{claimed!r} is claimed, but {n} samples of the audit are assigned to it",
-        )
+    if len(lit) == 0:
+        findings.fail("", f"{claimed:.6g} rad is claimed, but it lights no sample")
         return
     findings.holds(
         claimed >= -ROUNDING, "", f"{claimed:.6g} rad: a lit sample's is 0 or more"
