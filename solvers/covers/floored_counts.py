@@ -63,7 +63,7 @@ def fewest_with_floors(
 
 def _hardest(cover: ReducedCover, budget: WorkBudget) -> ReducedCover:
     """Return the row set whose floor by itself takes most sets, greedily."""
-    alone = (cover.of_row_set(g) for g in np.flatnonzero(cover.quotas))
+    alone = (cover.of_row_set(g) for g in np.flatnonzero(cover.quotas).tolist())
     by_count = {greedy(one, NONE, budget).size: one for one in alone}
     return by_count[max(by_count)] if by_count else cover.without_floors
 

@@ -171,6 +171,6 @@ def likeness(
     both = (covers * whole) @ covers.T
     alone = both.diagonal()
     either = alone[:, None] + alone[None, :] - both
-    alike = np.ones_like(both)
+    alike = np.ones(both.shape, dtype=np.float32)
     np.divide(both, either, out=alike, where=either > 0.0)
     return alike
