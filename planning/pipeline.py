@@ -285,20 +285,29 @@ def _planned(
 
 
 def _devices_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
-    """Devices, rings and proofs; one device more where fresh samples fall short."""
+    """Devices, rings and proofs; one device more where fresh samples fall short.
+
+    Where these denied cameras fewer than candidates take, no fewer are sought again for
+    the same projectors and axes: they would be found, and denied, without end.
+    """
     larger: PartialPlan | None = _first_plan(request, clock)
+    found = denied = False
     while larger is not None:
         yield larger, False
         partial = polished(larger, clock)
         yield partial, False
         partial = bounded_cameras(partial, clock)
-        if larger := with_fewer_cameras(partial, clock):
+        if not denied and (larger := with_fewer_cameras(partial, clock)):
+            found = True
             continue
         plan = yield partial, True
         assert plan is not None
         larger = with_free_axes(partial, plan, clock)
         larger = larger or one_more_for_losses(partial, plan, clock)
         larger = larger or one_device_more(partial, plan, clock)
+        same = larger and (larger.projectors, larger.axes)
+        denied = found and same == (partial.projectors, partial.axes)
+        found = denied
 
 
 def _first_plan(request: PlanRequest, clock: Stopwatch) -> PartialPlan:

@@ -8,7 +8,7 @@ from support.little_work import work_little
 
 from geometry.poses import look_at
 from geometry.shapes.primitives import sphere
-from planning import plan_rig
+from planning import pipeline, plan_rig
 from planning.cameras.camera_cover import (
     camera_candidate_views,
     denial,
@@ -28,6 +28,7 @@ from planning.scene.draws import DRAWS
 from planning.scene.lights import ring_frame
 from planning.scene.measured import lit_samples, measured_by
 from planning.scene.workspace.candidates import aimed_poses
+from planning.steps import stages
 from planning.verify.audit.audit import audit_plan
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -142,6 +143,41 @@ def test_a_plan_takes_fewer_cameras_than_its_candidates_need(monkeypatch):
     assert with_.needed.count < without.needed.count
     assert with_.candidates.n_candidates > without.candidates.n_candidates == 14
     assert "one moved at a time" in with_.routes.why
+
+
+def test_fewer_cameras_that_a_plan_denies_are_not_sought_again(monkeypatch):
+    """One more is taken then, which fewer were found beside, over and over."""
+    work_little(monkeypatch, every_pose=True)
+    monkeypatch.setattr(Rig, "n_projector_poses", 160)
+    monkeypatch.setattr(Rig, "n_camera_poses", 14)
+    seek, planned, sought = pipeline.with_fewer_cameras, [], []
+
+    def fewer(partial, clock):
+        sought.append(len(partial.cameras))
+        assert len(sought) < 9, "sought without end"
+        return seek(partial, clock)
+
+    def short(plan):
+        """Of samples that no search has seen too few are measured, the first time."""
+        planned.append(len(plan.cameras))
+        return False, planned[-1] == planned[0]
+
+    monkeypatch.setattr(pipeline, "with_fewer_cameras", fewer)
+    monkeypatch.setattr(stages, "short_of", short)
+    plan = plan_rig(
+        sphere(0.1, subdivisions=2),
+        load_rig("default"),
+        max_projectors=8,
+        target="surface",
+        dominant_coverage=0.6,
+        cameras_by="cover",
+        ring_axis="free",
+        check=False,
+        on_miss="return",
+    )
+    fewest = planned[0]
+    assert fewest < sought[0]
+    assert len(plan.cameras) == fewest + 1
 
 
 def test_fresh_samples_deny_cameras_that_measure_too_little_of_them():

@@ -31,6 +31,8 @@ from support.little_work import (
 
 # A plan of little work that computes for longer hangs, however busy the machine is.
 _LONGEST_S = 400
+# Told again, for a library that calls back may swallow it.
+_AGAIN_S = 20
 _INTERRUPTED = 130
 _AXES = DRAWS.axes.count
 
@@ -132,7 +134,7 @@ def _limited() -> Generator[None]:
         raise _TooLongError(f"computed for more than {_LONGEST_S} s")
 
     before = signal.signal(signal.SIGPROF, late)
-    signal.setitimer(signal.ITIMER_PROF, _LONGEST_S)
+    signal.setitimer(signal.ITIMER_PROF, _LONGEST_S, _AGAIN_S)
     try:
         yield
     finally:
