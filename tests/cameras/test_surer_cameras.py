@@ -151,7 +151,8 @@ def test_a_count_beyond_the_cover_is_no_proof(handmade):
     assert after.certificate.candidates == proof.candidates
     assert after.certificate.best_area.upper_bound_m2 == 1.0
     assert after.certificate.by_count == (row,)
-    assert after.by_count == {proof.count: cover[proof.count], n: ("D",) * n}
+    # What the best of fewer cover may be more: they are planned for something else.
+    assert after.by_count == {n: ("D",) * n}
     # What is reachable is told of other samples: what was found is reachable, too.
     best = counted(before, ("D",) * n, 0.5 * row.value_m2).certificate.best_area
     assert best.upper_bound_m2 == best.value_m2 == row.value_m2
