@@ -1,8 +1,9 @@
 """Fewest sets that cover what is required of all, and floors of row sets beside it.
 
 What is required of all comes first: its searches are fast, and its bound holds for the
-stricter cover. Where what they choose misses a floor, as many sets that miss none are
-looked for at prices of the row sets, then one more, and so on; from below, counts are
+stricter cover, as does that of the floor which takes most sets by itself. Where what
+they choose misses a floor, sets that miss none are looked for at prices of the row
+sets, halving the gap between those bounds and the sets known; from below, counts are
 refuted by the exact search at those prices, at last by HiGHS' branch and bound.
 """
 
