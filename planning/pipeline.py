@@ -287,18 +287,17 @@ def _planned(
 def _devices_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
     """Devices, rings and proofs; one device more where fresh samples fall short.
 
-    Where these denied cameras fewer than candidates take, no fewer are sought again for
-    the same projectors and axes: they would be found, and denied, without end.
+    Where these denied as many cameras, no fewer are sought for the same projectors and
+    axes: they would be found, and denied, without end.
     """
     larger: PartialPlan | None = _first_plan(request, clock)
-    found = denied = False
+    denied = False
     while larger is not None:
         yield larger, False
         partial = polished(larger, clock)
         yield partial, False
         partial = bounded_cameras(partial, clock)
         if not denied and (larger := with_fewer_cameras(partial, clock)):
-            found = True
             continue
         plan = yield partial, True
         assert plan is not None
@@ -306,8 +305,7 @@ def _devices_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPla
         larger = larger or one_more_for_losses(partial, plan, clock)
         larger = larger or one_device_more(partial, plan, clock)
         same = larger and (larger.projectors, larger.axes)
-        denied = found and same == (partial.projectors, partial.axes)
-        found = denied
+        denied = same == (partial.projectors, partial.axes)
 
 
 def _first_plan(request: PlanRequest, clock: Stopwatch) -> PartialPlan:
