@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from planning.model.document.certificates import CamerasBy
 from planning.model.document.ring_records import AxisTaken, RingAxis
 from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.proofs.selection import fewest_count
+from planning.proofs.selection import fewest_count, fewest_of
 from planning.rings.acquisition import pixels_read
 from planning.rings.axis_moves import move_ring_axes
 from planning.rings.centred_axes import centred_axes
@@ -22,7 +22,6 @@ from planning.scene.camera_views import CandidateViews
 from planning.scene.measured import LitSamples, lit_samples
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
-from solvers.covers.cover import solve_cover
 
 from .camera_cover import (
     CameraCover,
@@ -115,8 +114,8 @@ def _seen_bound(
     """
     seen = candidates.seen(samples.target)
     seen &= np.any(measured, axis=1)[:, None]
-    problem = candidate_cover(scene, seen, samples, candidates.cameras).problem
-    return solve_cover(problem, seed=scene.seed).lower_bound
+    cover = candidate_cover(scene, seen, samples, candidates.cameras)
+    return fewest_of(cover).lower_bound
 
 
 def standing_axes(

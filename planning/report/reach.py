@@ -1,4 +1,4 @@
-"""What poses reach of samples, one pose after another on what is still missing."""
+"""What poses reach of samples, pose after pose on what is still missing."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby, islice

@@ -40,10 +40,10 @@ def fewest_with_floors(
 
     But for floors it is simple. All sets together meet the requirement.
     """
-    alone, floor = cover.without_floors, _hardest(cover, budget)
-    most = greedy(alone, NONE, budget).size
+    alone = cover.without_floors
+    floor, count = _hardest(cover, budget)
     # What floors ask for alone, the total's proof needn't know.
-    share = _TOTAL_ALONE[greedy(floor, NONE, budget).size > most]
+    share = _TOTAL_ALONE[count > greedy(alone, NONE, budget).size]
     part = budget.part(share * budget.units)
     found = fewest_sets(alone, part, seed=seed, heaviest=False)
     # Of nothing that is lacking the search takes one set all the same.
@@ -62,11 +62,11 @@ def fewest_with_floors(
     return replace(found, total_bound=total_bound)
 
 
-def _hardest(cover: ReducedCover, budget: WorkBudget) -> ReducedCover:
-    """Return the row set whose floor by itself takes most sets, greedily."""
+def _hardest(cover: ReducedCover, budget: WorkBudget) -> tuple[ReducedCover, int]:
+    """Return the row set whose floor by itself takes most sets, greedily, and them."""
     alone = (cover.of_row_set(g) for g in np.flatnonzero(cover.quotas).tolist())
-    by_count = {greedy(one, NONE, budget).size: one for one in alone}
-    return by_count[max(by_count)] if by_count else cover.without_floors
+    counted = ((one, greedy(one, NONE, budget).size) for one in alone)
+    return max(counted, key=lambda each: each[1], default=(cover.without_floors, 0))
 
 
 def _from_above(

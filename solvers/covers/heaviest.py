@@ -152,13 +152,11 @@ def _of_floored(
     if np.all(cover.covered_by(best) >= cover.quotas):
         return free
     if (few := least_lacking(cover, n_sets, budget)) is not None:
-        weight, proof = (
-            cover.weight_of(few),
-            f"{exact_search(n_sets)[1]}, {FLOORS_COUNTED}",
-        )
-        if cover.meets(few):
-            return Answer(SolveStatus.OPTIMAL, few, weight, proof, free.bound)
-        return Answer(SolveStatus.FEASIBLE, few, free.bound, free.proof, free.bound)
+        if not cover.meets(few):
+            return Answer(SolveStatus.FEASIBLE, few, free.bound, free.proof, free.bound)
+        proof = f"{exact_search(n_sets)[1]}, {FLOORS_COUNTED}"
+        weight = cover.weight_of(few)
+        return Answer(SolveStatus.OPTIMAL, few, weight, proof, free.bound)
     part = budget.part(0.4 * budget.remaining)
     for first in (best, greedy(cover, start, budget, n_sets=n_sets)):
         lacks_less, prices = least_shortage(cover, first, part, seed)

@@ -117,24 +117,35 @@ def test_what_fresh_samples_deny_is_not_taken(monkeypatch):
     assert len({draw for _, draw in asked}) == len(asked) > 1
 
 
-def test_a_plan_takes_fewer_cameras_than_its_candidates_need(monkeypatch):
-    """Its poses join the candidates, over which the count is proved and audited."""
+def few_poses(monkeypatch):
+    """So few cameras are offered that moved ones save some."""
     work_little(monkeypatch, every_pose=True)
     monkeypatch.setattr(Rig, "n_projector_poses", 160)
     monkeypatch.setattr(Rig, "n_camera_poses", 14)
+
+
+def planned(**more):
+    """A ball, lit by as many projectors as it takes."""
+    return plan_rig(
+        sphere(0.1, subdivisions=2),
+        load_rig("default"),
+        max_projectors=8,
+        target="surface",
+        dominant_coverage=0.6,
+        cameras_by="cover",
+        check=False,
+        on_miss="return",
+        **more,
+    )
+
+
+def test_a_plan_takes_fewer_cameras_than_its_candidates_need(monkeypatch):
+    """Its poses join the candidates, over which the count is proved and audited."""
+    few_poses(monkeypatch)
     effort, proofs = camera_bound.DEFAULT, []
     for starts in (0, 1):
         monkeypatch.setattr(camera_bound, "DEFAULT", replace(effort, starts=starts))
-        plan = plan_rig(
-            sphere(0.1, subdivisions=2),
-            load_rig("default"),
-            max_projectors=8,
-            target="surface",
-            dominant_coverage=0.6,
-            cameras_by="cover",
-            check=False,
-            on_miss="return",
-        )
+        plan = planned()
         proof = plan.document.certificates.cameras
         assert len(plan.cameras) == proof.needed.count == proof.candidates.lower_bound
         assert audit_plan(plan).failures == ()
@@ -147,10 +158,8 @@ def test_a_plan_takes_fewer_cameras_than_its_candidates_need(monkeypatch):
 
 def test_fewer_cameras_that_a_plan_denies_are_not_sought_again(monkeypatch):
     """One more is taken then, which fewer were found beside, over and over."""
-    work_little(monkeypatch, every_pose=True)
-    monkeypatch.setattr(Rig, "n_projector_poses", 160)
-    monkeypatch.setattr(Rig, "n_camera_poses", 14)
-    seek, planned, sought = pipeline.with_fewer_cameras, [], []
+    few_poses(monkeypatch)
+    seek, counts, sought = pipeline.with_fewer_cameras, [], []
 
     def fewer(partial, clock):
         sought.append(len(partial.cameras))
@@ -159,23 +168,13 @@ def test_fewer_cameras_that_a_plan_denies_are_not_sought_again(monkeypatch):
 
     def short(plan):
         """Of samples that no search has seen too few are measured, the first time."""
-        planned.append(len(plan.cameras))
-        return False, planned[-1] == planned[0]
+        counts.append(len(plan.cameras))
+        return False, counts[-1] == counts[0]
 
     monkeypatch.setattr(pipeline, "with_fewer_cameras", fewer)
     monkeypatch.setattr(stages, "short_of", short)
-    plan = plan_rig(
-        sphere(0.1, subdivisions=2),
-        load_rig("default"),
-        max_projectors=8,
-        target="surface",
-        dominant_coverage=0.6,
-        cameras_by="cover",
-        ring_axis="free",
-        check=False,
-        on_miss="return",
-    )
-    fewest = planned[0]
+    plan = planned(ring_axis="free")
+    fewest = counts[0]
     assert fewest < sought[0]
     assert len(plan.cameras) == fewest + 1
 

@@ -2,22 +2,13 @@
 
 import numpy as np
 import pytest
-from support.factories import EXACT
+from support.factories import FEW_CANDIDATES
 from support.plain_shapes import grid, joined
 
 from geometry.mesh.mesh import TriangleMesh
 from planning import load_rig, plan_rig, verify_plan
 
-RIG = f"""
-base = "default"
-name = "few candidates"
-{EXACT}
-[placement]
-n_candidate_projectors = 60
-n_candidate_cameras = 60
-n_reference_projectors = 600
-n_reference_cameras = 400
-[limits]
+RIG = f"""{FEW_CANDIDATES}[limits]
 projector_max_incidence_deg = 50.0
 camera_max_incidence_deg = 50.0
 [requirements]

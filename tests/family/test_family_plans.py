@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from support.factories import EXACT
+from support.factories import FEW_CANDIDATES
 from support.plain_shapes import grid
 
 from geometry.mesh.mesh import TriangleMesh
@@ -15,18 +15,6 @@ from planning.cli.main import commands
 from planning.cli.output_folder import exchanged
 from planning.model.errors import InputError, PlanFileError
 from planning.steps.family.family_plan import family_plan, met
-
-RIG = f"""
-base = "default"
-name = "few candidates"
-{EXACT}
-[placement]
-n_candidate_projectors = 60
-n_candidate_cameras = 60
-n_reference_projectors = 600
-n_reference_cameras = 400
-"""
-
 
 # Options of the command line that aren't given.
 _NOTHING = dict.fromkeys(
@@ -48,7 +36,7 @@ def plate(towards: int, away: float = 0.03) -> TriangleMesh:
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory):
     path = tmp_path_factory.mktemp("rig") / "few.toml"
-    path.write_text(RIG)
+    path.write_text(FEW_CANDIDATES)
     return load_rig(path)
 
 
@@ -116,7 +104,7 @@ def test_a_member_that_is_short_of_devices_says_what_it_takes(rig, few):
 def test_members_say_that_bounds_leave_out_bodies_of_chosen_devices(few, tmp_path):
     path = tmp_path / "bodied.toml"
     body = "[camera.body]\nsize_mm = [60, 60, 120]\ncentre_mm = [0, 0, -61]\n"
-    path.write_text(RIG + body)
+    path.write_text(FEW_CANDIDATES + body)
     bodied = planned(load_rig(path), [plate(1), plate(-1)])
     for member in bodied.members:
         proofs = member.document.certificates
@@ -295,7 +283,7 @@ def folder(tmp_path):
         lines += [f"f {a} {b} {c}" for a, b, c in mesh.faces + 1]
         (parts / f"{name}.obj").write_text("\n".join(lines))
     (parts / "notes.txt").write_text("no mesh")
-    (tmp_path / "few.toml").write_text(RIG)
+    (tmp_path / "few.toml").write_text(FEW_CANDIDATES)
     return tmp_path
 
 

@@ -16,6 +16,17 @@ from planning.scene.scene import Scene
 TAU_M = 0.004
 # Of a rig file, for tests that aren't about what a calibration leaves.
 EXACT = "[calibration]\nangle_deg = 0.0\nposition_mm = 0.0\n"
+# A rig file of few candidates; tables of its own may follow.
+FEW_CANDIDATES = f"""
+base = "default"
+name = "few candidates"
+{EXACT}
+[placement]
+n_candidate_projectors = 60
+n_candidate_cameras = 60
+n_reference_projectors = 600
+n_reference_cameras = 400
+"""
 
 
 def make_rig(light: str = "diverging") -> Rig:

@@ -25,6 +25,7 @@ from planning.proofs.selection import CandidateCover, Selection, select_fewest
 from planning.report.partial_plan import PartialPlan, Prepared
 from planning.scene.camera_views import CandidateViews
 from planning.scene.measured import LitSamples, taken
+from planning.scene.placed_bodies import Device
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
@@ -84,8 +85,7 @@ def _needs(
     chosen = _places(partial.stage.projectors, candidates.projectors)
     own = select_fewest(candidates.cover, known=chosen, budget=_BUDGET)
     weight = candidates.samples.samples.weight
-    proof = _certificate(candidates.cover, own, weight)
-    proof = proof.changed(**bodies_left_out(candidates.projectors))
+    proof = _certificate(candidates.cover, own, weight, candidates.projectors)
     stage = ProjectorStage({}, proof, partial.projectors, candidates)
     scene = ready.scene.among(partial.projectors)
     cover = candidate_cover(scene, measured, samples, views.cameras)
@@ -95,8 +95,8 @@ def _needs(
         if measured.any()
         else unsought(cover)
     )
-    own_proof = _certificate(cover, fewest, samples.target.samples.weight)
-    own_proof = own_proof.changed(**bodies_left_out(views.cameras))
+    weight = samples.target.samples.weight
+    own_proof = _certificate(cover, fewest, weight, views.cameras)
     return MemberNeeds(
         stage,
         CameraStage(
@@ -181,11 +181,14 @@ def _places(devices: Sequence[object], among: Sequence[object]) -> np.ndarray:
 
 
 def _certificate(
-    cover: CandidateCover, own: Selection, sample_area_m2: float
+    cover: CandidateCover,
+    own: Selection,
+    sample_area_m2: float,
+    candidates: Sequence[Device],
 ) -> Certificate:
     """What was proved of the candidates that a member takes for itself."""
     reached = int(np.any(cover.covers, axis=1).sum()) * sample_area_m2
-    return Certificate(
+    proof = Certificate(
         count=own.needed,
         status="optimal" if own.lower_bound >= own.needed else "feasible",
         required_m2=own.required * sample_area_m2,
@@ -204,6 +207,7 @@ def _certificate(
         ),
         one_fewer=OneFewer(upper_bound_m2=reached),
     )
+    return proof.changed(**bodies_left_out(candidates))
 
 
 def _of_count(proof: Certificate, count: int, found_m2: float) -> Certificate:

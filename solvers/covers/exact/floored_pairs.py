@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from solvers.covers.bounds.reduced_cover import ReducedCover
 from solvers.status import WorkBudget
 
-MOST = 2
+from .pairs import DENSE_UNIT
+
+_MOST = 2
 # Dense multiply-adds, from which on all pairs aren't looked at.
 _MAX_PRODUCTS = 2e9
-# One of them costs this share of a unit.
-_DENSE_UNIT = 1.0 / 8.0
 
 
 def least_lacking(
@@ -29,9 +29,9 @@ def least_lacking(
     One set need serve each row. None where K is more than two, or pairs are too many.
     """
     products = float(cover.n_sets) ** n_sets * cover.weights.size
-    if n_sets > MOST or products > _MAX_PRODUCTS:
+    if n_sets > _MOST or products > _MAX_PRODUCTS:
         return None
-    budget.spend(products * _DENSE_UNIT + cover.entries)
+    budget.spend(products * DENSE_UNIT + cover.entries)
     missed = ~cover.by_set.astype(bool).toarray()
     spare, spare_of_all = cover.totals - cover.quotas, cover.total - cover.quota
     lacking, missing = np.zeros(1), np.zeros(1)

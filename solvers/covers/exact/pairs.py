@@ -22,7 +22,7 @@ _FIRST_ROWS = 64
 # Pairs are looked at one by one once fewer than this fraction is left.
 _FEW_PAIRS = 64
 # A dense multiply-add costs this share of a unit.
-_DENSE_UNIT = 1.0 / 8.0
+DENSE_UNIT = 1.0 / 8.0
 _CALL_UNITS = 1e5
 
 
@@ -123,7 +123,7 @@ class _Pairs:
             part = slice(start, start + length)
             missing += (ones[:, part] * weights[part]) @ others[:, part].T.astype(float)
             width = min(length, weights.size - start)
-            self.budget.spend(missing.size * (4.0 + width * _DENSE_UNIT))
+            self.budget.spend(missing.size * (4.0 + width * DENSE_UNIT))
             start, length = start + length, 4 * length
             alive = missing <= allowed
             n_alive = int(np.count_nonzero(alive))

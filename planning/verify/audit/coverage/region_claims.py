@@ -18,7 +18,7 @@ from planning.verify.audit.predicates.recompute import light_of_plan
 MARGIN_SLACK = np.radians(2.0)
 # Room for the rounding of a written direction or angle [rad].
 _ANGLE = 1e-4
-# Standard errors that two draws of a share may lie apart.
+# Standard errors that a share may lie off by chance.
 _ERRORS = 3.0
 # Share of a region's area whose normals its cone holds.
 _HELD = 0.98
@@ -87,7 +87,7 @@ def _audit_margin(
     if n == 0:
         return
     share = float((assigned < claimed - ROUNDING).mean())
-    allowed = POINT + 3.0 * float(np.sqrt(share * n + 1.0) / (n + 2.0))
+    allowed = POINT + _ERRORS * float(np.sqrt(share * n + 1.0) / (n + 2.0))
     findings.holds(
         share <= allowed,
         "",
@@ -224,7 +224,7 @@ def _audit_lit_by(
                 f"{name} is named, but can light no part of the region",
             )
             continue
-        allowed = POINT + 3.0 * float(np.sqrt(count + 1.0)) / n
+        allowed = POINT + _ERRORS * float(np.sqrt(count + 1.0)) / n
         findings.holds(
             count / n <= allowed,
             key,
