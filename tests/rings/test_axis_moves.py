@@ -9,6 +9,7 @@ from support.factories import make_camera, make_projector, make_requirements, ma
 
 from geometry.poses import inverse
 from geometry.shapes.primitives import sphere
+from planning.cameras import axis_choice
 from planning.cameras.axis_choice import (
     no_axes_need_fewer,
     other_axes,
@@ -289,6 +290,33 @@ def test_auto_takes_centred_axes_where_they_cost_no_camera(ball):
         for a, o in zip(auto.projectors, others, strict=True)
     ]
     assert min(apart) > 0.01
+
+
+def test_centred_axes_are_planned_whole_only_where_they_may_be_taken(ball, monkeypatch):
+    """Free ones that save a camera end it; as many are held against centred ones.
+
+    In diverging light the first samples say that centred ones do with two cameras,
+    which fresh ones deny: free ones come after them.
+    """
+    whole, projectors, cover = ball
+    scene = replace(whole, requirements=replace(whole.requirements, coverage=0.9))
+    asked, plain = [], cover_axes
+
+    def told(*given):
+        asked.append(given[-1])
+        return plain(*given)
+
+    def placed():
+        asked.clear()
+        views = cover.candidates
+        place_for_axes(scene, projectors, views, "cover", axis="auto", margin=5e-3)
+        return asked
+
+    monkeypatch.setattr(axis_choice, "cover_axes", told)
+    few = projectors[0].light == "parallel"
+    assert placed() == (["free"] if few else ["centred", "free"])
+    monkeypatch.setattr(axis_choice, "_needed_by_more", lambda *_: 2)
+    assert placed() == ["free", "centred"]
 
 
 def test_what_cameras_see_bounds_what_any_axes_need(ball):
