@@ -15,7 +15,7 @@ from planning.model.document.ring_records import RingAxis
 from planning.model.errors import InputError
 from planning.model.plan import RequirementError, RigPlan
 from planning.model.progress import Report, Stopwatch
-from planning.report.assemble import write_plan
+from planning.report.assemble import Draft, write_plan
 from planning.report.live_bar import shown
 from planning.report.partial_plan import PartialPlan, PlanRequest
 from planning.report.tolerance.robust import robustly
@@ -32,7 +32,7 @@ from .steps.cameras_alone.stages import planned_alone
 from .steps.carried import devices_of_heads, pattern_of_rig
 from .steps.checked import Checked, axes_may_help, checked_plan, missed_by
 from .steps.family.family_plan import with_members
-from .steps.family.family_search import family_sought, write_family
+from .steps.family.family_search import FamilyDraft, family_sought
 from .steps.front.taken_point import TakenPoint
 from .steps.heads import heads_sought
 from .steps.joint.joining import jointly
@@ -250,7 +250,7 @@ def _of_family(
     on_miss: Literal["raise", "return"],
 ) -> RigPlan:
     """The rig of a family, each member's plan checked by itself."""
-    plan, _ = best_kept(family_sought(request, clock), write_family, clock, keep)
+    plan, _ = best_kept(family_sought(request, clock), FamilyDraft.of, clock, keep)
     if check and not plan.document.truncated:
         members = [
             checked_plan(member, request.threads, clock, None, checked)
@@ -281,10 +281,12 @@ def _planned(
         search = steps_sought(request, clock)
     else:
         search = _devices_sought(request, clock)
-    return best_kept(search, write_plan, clock, keep)
+    return best_kept(search, Draft.of, clock, keep)
 
 
-def _devices_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
+def _devices_sought(
+    request: PlanRequest, clock: Stopwatch
+) -> Search[PartialPlan, Draft]:
     """Devices, rings and proofs; one device more where fresh samples fall short.
 
     Where these denied as many cameras, no fewer are sought for the same projectors and
@@ -299,11 +301,11 @@ def _devices_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPla
         partial = bounded_cameras(partial, clock)
         if not denied and (larger := with_fewer_cameras(partial, clock)):
             continue
-        plan = yield partial, True
-        assert plan is not None
-        larger = with_free_axes(partial, plan, clock)
-        larger = larger or one_more_for_losses(partial, plan, clock)
-        larger = larger or one_device_more(partial, plan, clock)
+        draft = yield partial, True
+        assert draft is not None
+        larger = with_free_axes(partial, draft, clock)
+        larger = larger or one_more_for_losses(partial, draft, clock)
+        larger = larger or one_device_more(partial, draft, clock)
         same = larger and (larger.projectors, larger.axes)
         denied = same == (partial.projectors, partial.axes)
 

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
@@ -58,6 +59,10 @@ class CurvatureField:
         return np.sqrt(0.5 * (self.k_max**2 + self.k_min**2))
 
 
+# By the mesh itself: a plan and its report ask for the same.
+_KNOWN: WeakKeyDictionary[TriangleMesh, CurvatureField] = WeakKeyDictionary()
+
+
 def principal_curvatures(
     mesh: TriangleMesh, radius: float | None = None
 ) -> CurvatureField:
@@ -80,8 +85,12 @@ def principal_curvatures(
         ValueError: If the radius isn't positive.
     """
     if radius is None:
-        radius = DEFAULT_RADIUS_SHARE * mesh.size
-        return _curvatures(mesh, radius, max(radius, facet_size(mesh)))
+        field = _KNOWN.get(mesh)
+        if field is None:
+            radius = DEFAULT_RADIUS_SHARE * mesh.size
+            field = _curvatures(mesh, radius, max(radius, facet_size(mesh)))
+            _KNOWN[mesh] = field
+        return field
     if not (radius > 0 and np.isfinite(radius)):
         raise ValueError(f"radius must be a positive number of metres, got {radius}")
     return _curvatures(mesh, radius, radius)

@@ -14,6 +14,7 @@ from pydantic import ValidationError
 from geometry.files.file_content import file_content
 from planning.model.document.coverage_records import Coverage, RegionRecord
 from planning.model.document.plan_document import FORMAT, VERSION, PlanDocument
+from planning.model.document.survival_records import SurvivalRecord
 
 from .errors import InputError, PlanFileError, PlanningError
 from .files import reading, write_together
@@ -102,6 +103,16 @@ class RigPlan:
     def coverage(self) -> Coverage:
         """Areas of the surface and the target, and what isn't covered, by cause."""
         return self.document.coverage
+
+    @property
+    def regions(self) -> tuple[RegionRecord, ...]:
+        """The dominant regions, and what becomes of each."""
+        return self.document.regions
+
+    @property
+    def survival(self) -> SurvivalRecord | None:
+        """What is left after losses; None where none are to be survived."""
+        return self.document.survival
 
     @property
     def large_regions(self) -> tuple[RegionRecord, ...]:

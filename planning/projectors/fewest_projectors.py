@@ -19,6 +19,9 @@ from .one_fewer import one_fewer
 
 # Of fresh samples that don't confirm a cover one in so many joins those of the next.
 _JOINING = 3
+# Candidates that are asked first what they reach of what is dark, each time twice as
+# many: where too little is lit, the first often show it.
+_FIRST_ASKED = 32
 # Standard errors above their floors at which fresh samples confirm regions.
 _AIMED = 1.0
 # Counted work of the cover whose count is kept, where less left it unproved; the
@@ -167,6 +170,9 @@ def confirms(
     # Where it is enough of all there is, what candidates reach needn't be known.
     if enough(np.ones(len(lit), dtype=bool)):
         return True
-    reached, dark = lit.copy(), samples.take(~lit)
-    reached[~lit] = CandidateSet.over(scene, dark, candidates.projectors).reached
+    reached, size, rest = lit.copy(), _FIRST_ASKED, candidates.projectors
+    while rest and enough(reached):
+        few, rest, size = rest[:size], rest[size:], 2 * size
+        dark = np.flatnonzero(~reached)
+        reached[dark] = CandidateSet.over(scene, samples.take(dark), few).reached
     return enough(reached)

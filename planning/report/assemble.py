@@ -1,14 +1,20 @@
 """Turns a partial plan into a plan: poses rounded, every claim recomputed from them."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from planning.cameras.baselines.baseline_rows import baseline_rows
 from planning.cameras.baselines.seams import SampledSurface
 from planning.model.document.certificates import Certificates
-from planning.model.document.coverage_records import CameraMarginal, ProjectorMarginal
+from planning.model.document.coverage_records import (
+    CameraMarginal,
+    Coverage,
+    ProjectorMarginal,
+    RegionRecord,
+)
 from planning.model.document.device_records import BaselineRow, EvaluationRecord
 from planning.model.document.ring_records import RingsRecord
+from planning.model.document.survival_records import SurvivalRecord
 from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
@@ -40,15 +46,55 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
 
     A plan that was cut goes without advice.
     """
-    devices = _rounded_devices(partial)
-    scene = partial.scene
-    with clock.stage("claims", "coverage, recomputed from the rounded poses"):
-        claims = make_claims(scene, devices)
-        marginal = _marginal(partial, devices, claims)
-        survival = survival_record(scene, devices, claims, partial.surviving)
+    return Draft.of(partial, clock).written(clock)
+
+
+@dataclass(frozen=True, eq=False)
+class Draft:
+    """A plan of which areas are known: advice and certificates are for the last one.
+
+    Attributes:
+        devices: Whose poses are rounded as they will be written.
+    """
+
+    partial: PartialPlan
+    devices: Devices
+    claims: Claims
+    marginal: tuple[ProjectorMarginal | CameraMarginal, ...]
+    survival: SurvivalRecord | None
+    regions: tuple[RegionRecord, ...]
+
+    @classmethod
+    def of(cls, partial: PartialPlan, clock: Stopwatch) -> "Draft":
+        """Round the poses and recompute every area from them."""
+        devices, scene = _rounded_devices(partial), partial.scene
+        with clock.stage("claims", "coverage, recomputed from the rounded poses"):
+            claims = make_claims(scene, devices)
+            marginal = _marginal(partial, devices, claims)
+            survival = survival_record(scene, devices, claims, partial.surviving)
+        regions = entries.region_records(scene.mesh, partial.ready.regions, claims)
+        return cls(partial, devices, claims, marginal, survival, regions)
+
+    @property
+    def requirements(self) -> Requirements:
+        """What is asked of the plan."""
+        return self.partial.scene.requirements
+
+    @property
+    def coverage(self) -> Coverage:
+        """What is lit and measured, of fresh samples."""
+        return self.claims.coverage
+
+    def written(self, clock: Stopwatch) -> RigPlan:
+        """Return the plan."""
+        return _written(self, clock)
+
+
+def _written(draft: Draft, clock: Stopwatch) -> RigPlan:
+    partial, devices, claims = draft.partial, draft.devices, draft.claims
+    scene, regions = partial.scene, draft.regions
     among = scene.among((*devices.projectors, *devices.cameras))
     coverage, certificates = claims.coverage, _certificates(partial)
-    regions = entries.region_records(scene.mesh, partial.ready.regions, claims)
     if not partial.truncated and partial.stationed is None:
         coverage = with_relaxations(partial, devices, claims, clock)
         regions = with_floor_relaxations(
@@ -70,7 +116,7 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
         regions,
         entries.projector_records(among, devices, _rings(partial), claims),
         entries.camera_records(among, devices.cameras, claims),
-        marginal,
+        draft.marginal,
         certificates,
         _baselines(partial, devices, claims, requirements),
     )
@@ -78,7 +124,7 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
         "ring_axes": entries.axes_record(among, partial, devices, claims),
         "overlaps": overlaps,
         "firing_schedule": schedule,
-        "survival": survival,
+        "survival": draft.survival,
     }
     if stationed is not None:
         others["stations"] = stations_record(stationed, devices)

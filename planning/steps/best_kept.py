@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Generator
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Protocol, TypeVar
 
 from planning.model.plan import InterruptedPlanError, RigPlan
@@ -24,19 +24,39 @@ class _Partial(Protocol):
     def truncated(self) -> bool: ...
 
 
+class Known(Protocol):
+    """What is known of a plan before all of it is written."""
+
+    def written(self, clock: Stopwatch) -> RigPlan:
+        """Return the plan."""
+        ...
+
+
+@dataclass(frozen=True)
+class Whole:
+    """A plan that nothing is left to be written of."""
+
+    plan: RigPlan
+
+    def written(self, clock: Stopwatch) -> RigPlan:
+        """Return the plan."""
+        return self.plan
+
+
 P = TypeVar("P", bound=_Partial)
-# Gives what there is so far, ever better, and whether its plan is wanted: then it is
-# sent back, for what comes next hangs on it. Ends after a plan that is good enough.
-Search = Generator[tuple[P, bool], RigPlan | None, None]
+D = TypeVar("D", bound=Known)
+# Gives what there is so far, ever better, and whether its draft is wanted: then it is
+# sent back, for what comes next hangs on it. Ends after a draft that is good enough.
+Search = Generator[tuple[P, bool], D | None, None]
 
 
 def best_kept(
-    search: Search[P],
-    write: Callable[[P, Stopwatch], RigPlan],
+    search: Search[P, D],
+    draft: Callable[[P, Stopwatch], D],
     clock: Stopwatch,
     keep: Keep | None,
 ) -> tuple[RigPlan, P]:
-    """Return the last plan of a search, and what it was written from.
+    """Return the plan of a search's last draft, and what it was written from.
 
     With a time limit the first of all is written at once: that shows how long it takes,
     and stands if there is no time to write a better one.
@@ -45,6 +65,10 @@ def best_kept(
         InterruptedPlanError: If the search is interrupted; it carries the best plan.
         TimeLimitError: If the time limit came before any plan was written.
     """
+
+    def write(partial: P, clock: Stopwatch) -> RigPlan:
+        return draft(partial, clock).written(clock)
+
     first: RigPlan | None = None
     partial, wanted = next(search)
     begun = partial
@@ -52,12 +76,12 @@ def best_kept(
         if clock.limited:
             first = _first_kept(_cut(partial), write, clock, keep)
         while True:
-            plan = write(partial, clock) if wanted else None
+            known = draft(partial, clock) if wanted else None
             try:
-                partial, wanted = search.send(plan)
+                partial, wanted = search.send(known)
             except StopIteration:
-                assert plan is not None
-                return plan, partial
+                assert known is not None
+                return known.written(clock), partial
     except KeyboardInterrupt:
         clock.lift()
         raise InterruptedPlanError(write(_cut(partial), clock)) from None

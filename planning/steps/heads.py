@@ -20,6 +20,7 @@ from planning.model.errors import InfeasibleLimitsError
 from planning.model.progress import Stopwatch
 from planning.model.words import count_words
 from planning.proofs import projector_bound
+from planning.report.assemble import Draft
 from planning.report.partial_plan import PartialPlan, PlanRequest, Prepared
 
 from .best_kept import Search
@@ -27,7 +28,7 @@ from .prepare import prepared
 from .stages import short_of
 
 
-def heads_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
+def heads_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan, Draft]:
     """Give the fewest heads, or stations of one; one more where fresh samples ask.
 
     Raises:
@@ -51,9 +52,9 @@ def heads_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
         everywhere = least_by_light(ready.scene, found.heads, ready.templates, effort)
     partial = partial.told(count=_count(found, everywhere))
     while True:
-        plan = yield partial, True
-        assert plan is not None
-        if not any(short_of(plan)) or len(found.chosen) >= most:
+        draft = yield partial, True
+        assert draft is not None
+        if not any(short_of(draft)) or len(found.chosen) >= most:
             return
         more = found.with_one_more(source)
         if more is None:

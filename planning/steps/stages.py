@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Protocol
 
 from planning.cameras.axis_choice import other_axes, place_for_axes
 from planning.cameras.baselines.widest_baselines import WidestBaselines
@@ -14,10 +15,12 @@ from planning.cameras.camera_stage import CameraSolution, follow_cameras
 from planning.cameras.free_cameras import has_room, one_camera_fewer
 from planning.cameras.proved_cameras import CameraStage, bound_stage
 from planning.model.document.certificates import Certificate
+from planning.model.document.coverage_records import Coverage, RegionRecord
 from planning.model.document.ring_records import RingAxis
+from planning.model.document.survival_records import SurvivalRecord
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
+from planning.model.requirements import Requirements
 from planning.projectors.candidate_set import NothingLitError
 from planning.projectors.projector_stage import ProjectorStage
 from planning.proofs import camera_bound, projector_bound
@@ -32,6 +35,30 @@ from planning.rings.acquisition import pixels_read
 from planning.rings.kept_pairs import rings_for_pairs
 
 from .recalled import fewest_projectors, proved_projectors, widened_projectors
+
+
+class Claimed(Protocol):
+    """A plan, or the draft of one: what is asked, and what comes of fresh samples."""
+
+    @property
+    def requirements(self) -> Requirements:
+        """What is asked of the plan."""
+        ...
+
+    @property
+    def coverage(self) -> Coverage:
+        """Areas of the surface and the target."""
+        ...
+
+    @property
+    def regions(self) -> Sequence[RegionRecord]:
+        """What becomes of each region."""
+        ...
+
+    @property
+    def survival(self) -> SurvivalRecord | None:
+        """What is left after losses, where any are to be survived."""
+        ...
 
 
 def first_projectors(ready: Prepared, clock: Stopwatch) -> ProjectorStage:
@@ -245,7 +272,7 @@ def with_fewer_cameras(partial: PartialPlan, clock: Stopwatch) -> PartialPlan | 
 
 
 def with_free_axes(
-    partial: PartialPlan, plan: RigPlan, clock: Stopwatch
+    partial: PartialPlan, plan: Claimed, clock: Stopwatch
 ) -> PartialPlan | None:
     """Cameras for free ring axes, where centred ones were tried and measure too little.
 
@@ -259,12 +286,12 @@ def with_free_axes(
     return placed(partial.ready, partial.stage, clock, "free")
 
 
-def short_of(plan: RigPlan) -> tuple[bool, bool]:
+def short_of(plan: Claimed) -> tuple[bool, bool]:
     """Whether less than is required is lit, and measured, in all or of a region."""
     required, areas = plan.requirements, plan.coverage.target
     floors = [
         below_floor(region.coverage, required.region_coverage)
-        for region in plan.document.regions
+        for region in plan.regions
         if region.coverage is not None and region.coverage.floor == "missed"
     ]
     return (
@@ -280,7 +307,7 @@ def short_of(plan: RigPlan) -> tuple[bool, bool]:
 
 
 def one_device_more(
-    partial: PartialPlan, plan: RigPlan, clock: Stopwatch
+    partial: PartialPlan, plan: Claimed, clock: Stopwatch
 ) -> PartialPlan | None:
     """One device more where fresh samples don't confirm a cover that met its own.
 

@@ -11,7 +11,6 @@ from planning.cameras.camera_cover import NothingMeasuredError, camera_candidate
 from planning.cameras.proved_cameras import bound_stage
 from planning.cameras.surviving_cameras import surviving_cameras
 from planning.model.errors import InputError
-from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
 from planning.projectors.projector_stage import ProjectorStage
 from planning.projectors.surviving_projectors import surviving_projectors
@@ -21,7 +20,7 @@ from planning.proofs.surviving_counts import SurvivingCount
 from planning.report.entries.survival_entries import falls_short_after
 from planning.report.partial_plan import PartialPlan, PlanRequest, Prepared
 
-from .stages import placed
+from .stages import Claimed, placed
 
 
 def check_survival(request: PlanRequest) -> None:
@@ -148,10 +147,10 @@ def _cameras_without(ready: Prepared, stage: ProjectorStage) -> int:
 
 
 def one_more_for_losses(
-    partial: PartialPlan, plan: RigPlan, clock: Stopwatch
+    partial: PartialPlan, plan: Claimed, clock: Stopwatch
 ) -> PartialPlan | None:
     """One device more where fresh samples don't confirm what is left after a loss."""
-    record, counts = plan.document.survival, partial.surviving
+    record, counts = plan.survival, partial.surviving
     if record is None or counts is None:
         return None
     short = [falls_short_after(loss, plan.requirements) for loss in record.losses]

@@ -34,6 +34,7 @@ from planning.model.document.station_records import (
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.progress import Stopwatch
 from planning.model.words import count_words
+from planning.report.assemble import Draft
 from planning.report.partial_plan import PartialPlan, PlanRequest, Prepared
 from planning.scene.draws import DRAWS
 from planning.scene.placed_bodies import Obstruction
@@ -57,7 +58,7 @@ class _Traded:
     found: dict[tuple[int, int], Steps]
 
 
-def steps_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
+def steps_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan, Draft]:
     """Give the fewest devices, or steps, and one look further where it falls short.
 
     With a number of cameras given, as few steps as that many devices allow; else as few
@@ -97,17 +98,17 @@ def steps_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
         partial = partial.told(steps=traded.rows)
     else:
         partial = _placed(ready, search, traded, taken, clock)
-    plan = yield partial, True
+    draft = yield partial, True
     for spare in _SPARE:
-        assert plan is not None
-        if not any(short_of(plan)):
+        assert draft is not None
+        if not any(short_of(draft)):
             return
         clock.say("  fresh samples fall short: more is asked of the others")
         asked = StepSearch.of(_asking_more(scene, spare), sets, room)
         steps, _ = asked.fewest(*taken, most)
         if steps is not None:
             partial = _placed(ready, search, traded, taken, clock, steps)
-            plan = yield partial, True
+            draft = yield partial, True
 
 
 def _too_little(

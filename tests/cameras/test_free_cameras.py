@@ -166,9 +166,9 @@ def test_fewer_cameras_that_a_plan_denies_are_not_sought_again(monkeypatch):
         assert len(sought) < 9, "sought without end"
         return seek(partial, clock)
 
-    def short(plan):
+    def short(draft):
         """Of samples that no search has seen too few are measured, the first time."""
-        counts.append(len(plan.cameras))
+        counts.append(len(draft.partial.cameras))
         return False, counts[-1] == counts[0]
 
     monkeypatch.setattr(pipeline, "with_fewer_cameras", fewer)

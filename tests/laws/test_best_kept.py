@@ -9,7 +9,7 @@ import pytest
 from planning.model.errors import TimeLimitError
 from planning.model.plan import InterruptedPlanError
 from planning.model.progress import Stopwatch
-from planning.steps.best_kept import Search, best_kept
+from planning.steps.best_kept import Search, Whole, best_kept
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Partial:
 
 def searched(
     end: Callable[[], None], after: int, asked: list[object]
-) -> Search[Partial]:
+) -> Search[Partial, Whole]:
     """A draft, its plan, a draft, its plan; something ends it after so many."""
     for k, (name, wanted) in enumerate(
         (("draft", False), ("whole", True), ("better", False), ("best", True))
@@ -45,7 +45,7 @@ def kept(end, after, *, limit=None):
 
     def write(partial: Partial, _: Stopwatch) -> Any:
         written.append(f"{partial.name}{'*' if partial.truncated else ''}")
-        return written[-1]
+        return Whole(cast(Any, written[-1]))
 
     clock, search = Stopwatch(time_limit=limit), searched(end, after, asked)
     try:
@@ -93,3 +93,19 @@ def test_a_limit_before_anything_was_written_is_an_error():
         kept(ended(TimeLimitError), 0, limit=1e6)
     with pytest.raises(KeyboardInterrupt):
         kept(ended(KeyboardInterrupt), 0)
+
+
+def test_of_drafts_that_a_search_goes_on_from_nothing_more_is_written():
+    finished: list[str] = []
+
+    class Draft(Whole):
+        def written(self, clock: Stopwatch) -> Any:
+            finished.append(cast(str, self.plan))
+            return super().written(clock)
+
+    def draft(partial: Partial, _: Stopwatch) -> Draft:
+        return Draft(cast(Any, partial.name))
+
+    search = searched(ended(KeyboardInterrupt), 9, [])
+    assert best_kept(search, draft, Stopwatch(), None)[0] == "best"
+    assert finished == ["best"]

@@ -18,7 +18,7 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.rays import visibility
 from geometry.shapes.primitives import sphere
 from planning import pipeline
-from planning.report.assemble import write_plan
+from planning.report.assemble import Draft, write_plan
 from planning.rig.rig import load_rig
 from planning.scene.codes.patterns import RingPattern
 from planning.scene.draws import Draw
@@ -89,14 +89,14 @@ def made(scene, tmp_path_factory):
     path = tmp_path_factory.mktemp("rig") / "flips.toml"
     path.write_text(RIG)
     sources = []
-    right = pipeline.write_plan
+    right = Draft.of
 
-    def kept(draft, clock):
-        sources.append((draft, clock))
-        return right(draft, clock)
+    def kept(partial, clock):
+        sources.append((partial, clock))
+        return right(partial, clock)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pipeline, "write_plan", kept)
+        patch.setattr(Draft, "of", kept)
         wishes = {"target": "surface", "cameras_by": "cover", "check": False}
         plan = pipeline.plan_rig(scene, load_rig(path), max_projectors=4, **wishes)
     return plan, sources[-1]

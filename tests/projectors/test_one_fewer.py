@@ -13,13 +13,14 @@ from support.factories import make_projector, make_requirements, make_scene
 
 from geometry.shapes.primitives import sphere
 from planning.projectors.candidate_set import CandidateSet, CandidateSource
+from planning.projectors.fewest_projectors import confirms
 from planning.projectors.one_fewer import _swapped, one_fewer
 from planning.projectors.share_margin import margin_at_share, widest_between
 from planning.proofs.quotas import Quotas, RegionFloors, missed_shares
 from planning.proofs.selection import select_fewest
 from planning.rig.rig import load_rig
 from planning.rings.ring_radii import uniform_radii
-from planning.scene.draws import Draw
+from planning.scene.draws import DRAWS, Draw
 from planning.scene.lighting import lit_margins, lit_stages
 from planning.scene.limits import projector_limits
 from planning.scene.workspace.candidates import Candidates
@@ -43,6 +44,22 @@ def lattice(ball):
     poses = Candidates(template, scene.requirements.workspace).over(40)
     samples = scene.target_samples(Draw(2000, 100))
     return CandidateSource(scene, (template,)), CandidateSet.over(scene, samples, poses)
+
+
+def test_fresh_samples_deny_as_if_all_candidates_were_asked(lattice, monkeypatch):
+    """Of what any of 40 candidates reaches, which are asked 3, 6, 12, ... at a time."""
+    monkeypatch.setattr("planning.projectors.fewest_projectors._FIRST_ASKED", 3)
+    _, offer = lattice
+    fresh = offer.on(offer.scene.target_samples(DRAWS.fresh_projectors.later(1)))
+    rng, answers = np.random.default_rng(5), []
+    for share in np.linspace(0.5, 1.0, 40):
+        required = replace(offer.scene.requirements, dominant_coverage=share)
+        asking = replace(offer, scene=offer.scene.asking(required))
+        few = rng.choice(40, 6, replace=False)
+        lit = fresh.lit[:, few].any(axis=1)
+        answers.append(lit.sum() >= share * fresh.reached.sum())
+        assert confirms(asking, offer.of(few), 1) == answers[-1]
+    assert 3 < sum(answers) < 37
 
 
 def moved(lattice, n_projectors, n_existing=0):

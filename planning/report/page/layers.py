@@ -188,12 +188,11 @@ def _classes(
 def _curvedness(plan: RigPlan) -> Array | None:
     """Root mean square of both curvatures on faces [1/m], NaN where not trusted.
 
-    Recomputed with the plan's radius; None where the plan doesn't state it.
+    At the scale that regions were found at; None where the plan doesn't state one.
     """
-    mesh, radius = plan.surface.mesh, plan.document.surface.curvature_radius_m
-    if not radius > 0.0:
+    mesh = plan.surface.mesh
+    if not plan.document.surface.curvature_radius_m > 0.0:
         return None
-    field = principal_curvatures(mesh, radius)
-    curved = np.sqrt(0.5 * (field.k_max**2 + field.k_min**2))
-    curved = np.where(field.valid, curved, np.nan)
+    field = principal_curvatures(mesh)
+    curved = np.where(field.valid, field.curvedness, np.nan)
     return curved[mesh.faces].mean(axis=1)

@@ -15,7 +15,7 @@ from planning.report.advice.what_helps import falls_short
 from planning.report.partial_plan import PlanRequest
 from planning.report.region_claims import below_floor
 from planning.rig.devices.lens_fit import check_fields
-from planning.steps.best_kept import Keep, Search, best_kept
+from planning.steps.best_kept import Keep, Search, Whole, best_kept
 from planning.steps.prepare import prepared
 
 from .view_document import ViewPlan, write_view_plan
@@ -31,19 +31,23 @@ def planned_alone(
         InterruptedPlanError: If planning is interrupted; it carries the best plan.
         TimeLimitError: If the time limit came before any plan was written.
     """
-    plan, _ = best_kept(_cameras_sought(request, clock), write_view_plan, clock, keep)
+    plan, _ = best_kept(_cameras_sought(request, clock), _whole, clock, keep)
     return plan, None
 
 
-def _cameras_sought(request: PlanRequest, clock: Stopwatch) -> Search[ViewPlan]:
+def _whole(partial: ViewPlan, clock: Stopwatch) -> Whole:
+    return Whole(write_view_plan(partial, clock))
+
+
+def _cameras_sought(request: PlanRequest, clock: Stopwatch) -> Search[ViewPlan, Whole]:
     """The fewest cameras whose pairs measure enough; one more where samples ask."""
     partial = _first_cameras(request, clock)
     yield partial, False
     larger: ViewPlan | None = _bounded(partial, clock)
     while larger is not None:
-        plan = yield larger, True
-        assert plan is not None
-        larger = _one_camera_more(larger, plan, clock)
+        whole = yield larger, True
+        assert whole is not None
+        larger = _one_camera_more(larger, whole.plan, clock)
 
 
 def _first_cameras(request: PlanRequest, clock: Stopwatch) -> ViewPlan:

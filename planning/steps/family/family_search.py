@@ -10,7 +10,7 @@ from planning.model.plan import RigPlan
 from planning.model.progress import Stopwatch
 from planning.model.words import count_words
 from planning.projectors.projector_stage import ProjectorStage
-from planning.report.assemble import write_plan
+from planning.report.assemble import Draft
 from planning.report.partial_plan import PartialPlan, PlanRequest
 from planning.rig.devices.lens_fit import check_fields
 from planning.steps.best_kept import Search
@@ -39,7 +39,35 @@ class FamilyPartial:
     truncated: bool = False
 
 
-def family_sought(request: PlanRequest, clock: Stopwatch) -> Search[FamilyPartial]:
+@dataclass(frozen=True, eq=False)
+class FamilyDraft:
+    """Drafts of every member's plan, each from fresh samples of its own."""
+
+    family: PreparedFamily
+    members: tuple[Draft, ...]
+    record: FamilyRecord
+
+    @classmethod
+    def of(cls, made: FamilyPartial, clock: Stopwatch) -> "FamilyDraft":
+        """Recompute the areas of every member."""
+        family, partial = made.family, replace(made.partial, truncated=made.truncated)
+        proofs = made.proofs or FamilyProofs.over_candidates(family, partial)
+        drafts = tuple(
+            Draft.of(member_partial(ready, partial, needs), clock)
+            for ready, needs in zip(family.members, proofs.needs, strict=True)
+        )
+        return cls(family, drafts, proofs.record(family, partial))
+
+    def written(self, clock: Stopwatch) -> RigPlan:
+        """Return the plan of the family."""
+        asked = self.family.asked
+        plans = tuple(draft.written(clock) for draft in self.members)
+        return family_plan(plans, asked.names, asked.alignments, self.record)
+
+
+def family_sought(
+    request: PlanRequest, clock: Stopwatch
+) -> Search[FamilyPartial, FamilyDraft]:
     """Devices and rings for all members that are served; proofs; one device more."""
     check_fields(request.rig.fits(request.mesh))
     family = prepared_family(request, clock)
@@ -58,21 +86,9 @@ def family_sought(request: PlanRequest, clock: Stopwatch) -> Search[FamilyPartia
         yield FamilyPartial(family, partial), False
         proofs = FamilyProofs.over_candidates(family, partial)
         proofs = proofs.over_poses(family, clock)
-        plan = yield FamilyPartial(family, partial, proofs), True
-        assert plan is not None
-        larger = _larger(family, partial, plan, clock)
-
-
-def write_family(made: FamilyPartial, clock: Stopwatch) -> RigPlan:
-    """Write every member's plan, each from fresh samples of its own, and the whole."""
-    family, partial = made.family, replace(made.partial, truncated=made.truncated)
-    proofs = made.proofs or FamilyProofs.over_candidates(family, partial)
-    plans = tuple(
-        write_plan(member_partial(ready, partial, needs), clock)
-        for ready, needs in zip(family.members, proofs.needs, strict=True)
-    )
-    record: FamilyRecord = proofs.record(family, partial)
-    return family_plan(plans, family.asked.names, family.asked.alignments, record)
+        draft = yield FamilyPartial(family, partial, proofs), True
+        assert draft is not None
+        larger = _larger(family, partial, draft, clock)
 
 
 def _projectors(
@@ -116,11 +132,11 @@ def _say_left_out(family: PreparedFamily, clock: Stopwatch) -> None:
 
 
 def _larger(
-    family: PreparedFamily, partial: PartialPlan, plan: RigPlan, clock: Stopwatch
+    family: PreparedFamily, partial: PartialPlan, draft: FamilyDraft, clock: Stopwatch
 ) -> PartialPlan | None:
     """The rig with other axes or one device more, where any member falls short."""
     for member in family.served:
-        own = plan.members[member]
+        own = draft.members[member]
         larger = with_free_axes(partial, own, clock)
         larger = larger or one_device_more(partial, own, clock)
         if larger is not None:

@@ -15,7 +15,7 @@ from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import ProjectorStage
 from planning.projectors.proved_projectors import prove_fewest
 from planning.proofs import projector_bound
-from planning.report.assemble import write_plan
+from planning.report.assemble import Draft
 from planning.report.partial_plan import PartialPlan, PlanRequest, Prepared
 from planning.rig.devices.lens_fit import check_fields
 from planning.scene.draws import DRAWS
@@ -46,9 +46,11 @@ class TakenPoint:
         self, request: PlanRequest, clock: Stopwatch, keep: Keep | None
     ) -> tuple[RigPlan, PartialPlan]:
         """Return the plan of the point's devices, and what it was written from."""
-        return best_kept(self._sought(request, clock), write_plan, clock, keep)
+        return best_kept(self._sought(request, clock), Draft.of, clock, keep)
 
-    def _sought(self, request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan]:
+    def _sought(
+        self, request: PlanRequest, clock: Stopwatch
+    ) -> Search[PartialPlan, Draft]:
         check_front(request)
         check_fields(request.rig.fits(request.mesh))
         ready = prepared(request, clock)

@@ -343,3 +343,12 @@ def test_a_given_radius_is_taken_at_its_word() -> None:
     mesh = sphere(0.1, subdivisions=2)
     assert principal_curvatures(mesh, 1e-3).scale == 1e-3
     assert principal_curvatures(mesh).scale > 4e-3
+
+
+def test_what_was_asked_of_a_mesh_is_known():
+    mesh = sphere(0.1, subdivisions=3)
+    field = principal_curvatures(mesh)
+    assert principal_curvatures(mesh) is field
+    assert principal_curvatures(mesh, 2.0 * field.radius) is not field
+    alike = TriangleMesh(mesh.vertices, mesh.faces)
+    assert principal_curvatures(alike) is not field

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeVar
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -19,11 +19,14 @@ from .audit_devices import (
     audit_cameras,
     audit_projectors,
 )
+from .audit_optics import dot, towards
 from .occlusion import Shadow
 from .predicates import (
+    LIGHT_CAUSES,
     LIT,
     MEASURED,
     SEEN,
+    SIGHT_CAUSES,
     Steps,
     light_margin,
     light_steps,
@@ -34,6 +37,9 @@ from .reference_devices import reference_cameras, reference_projectors
 
 _NOT_LIT = -1
 _Device = TypeVar("_Device")
+# Place of the limit of incidence among those of light, and of sight.
+_INCIDENCE = LIGHT_CAUSES.index("projector_incidence")
+assert _INCIDENCE == SIGHT_CAUSES.index("camera_incidence")
 # Samples that go to a thread together.
 _PART = 2000
 
@@ -179,6 +185,12 @@ def reachable_by(
         samples = actual.samples.take(chosen)
         return light_steps(projector, samples, requirements.projector, shadow)
 
+    def from_projector(projector: AuditProjector, points: Array) -> Array:
+        return projector.light.to_points(points)[0]
+
+    def from_camera(camera: AuditCamera, points: Array) -> Array:
+        return towards(points, camera.world_from_device[:3, 3])[0]
+
     others = reference_projectors(plan)
 
     def measures(camera: AuditCamera, chosen: Ints) -> Steps:
@@ -194,17 +206,40 @@ def reachable_by(
         return steps.max(axis=0, initial=0)
 
     beyond = actual.lit & ~actual.measured
-    threads = shadow.caster.threads
-    light = _furthest(others, lights, ~actual.lit, LIT, rng, threads)
-    pair = _furthest(reference_cameras(plan), measures, beyond, MEASURED, rng, threads)
+    threads, samples = shadow.caster.threads, actual.samples
+    squarely = _Squarely(samples, from_projector, requirements.projector.max_incidence)
+    light = _furthest(others, lights, squarely, ~actual.lit, LIT, rng, threads)
+    squarely = _Squarely(samples, from_camera, requirements.camera.max_incidence)
+    cameras = reference_cameras(plan)
+    pair = _furthest(cameras, measures, squarely, beyond, MEASURED, rng, threads)
     by_cameras = actual.measured | (pair == MEASURED)
     pair[actual.measured] = MEASURED
     return Reachable(actual.lit | (light == LIT), by_cameras, light, pair)
 
 
+@dataclass(frozen=True, eq=False)
+class _Squarely(Generic[_Device]):
+    """Which samples a device meets at an angle that its limit of incidence allows.
+
+    Attributes:
+        way: Of a device and points (n, 3), the unit directions to these, (n, 3).
+        most: The limit [rad].
+    """
+
+    samples: AuditSamples
+    way: Callable[[_Device, Array], Array]
+    most: float
+
+    def met(self, device: _Device, chosen: Ints) -> Mask:
+        """Return which of the chosen samples, shape (n,)."""
+        along = self.way(device, self.samples.points[chosen])
+        return -dot(self.samples.normals[chosen], along) >= np.cos(self.most)
+
+
 def _furthest(
     devices: Sequence[_Device],
     steps_of: Callable[[_Device, Ints], Steps],
+    squarely: _Squarely[_Device],
     wanted: Mask,
     every: int,
     rng: np.random.Generator,
@@ -218,9 +253,15 @@ def _furthest(
         for index in order:
             if len(waiting) == 0:
                 break
-            steps = steps_of(devices[index], waiting)
-            furthest[waiting] = np.maximum(furthest[waiting], steps)
-            waiting = waiting[steps < every]
+            # What isn't met squarely comes no further than to that limit.
+            worth = furthest[waiting] < _INCIDENCE
+            worth |= squarely.met(devices[index], waiting)
+            looked = waiting[worth]
+            if len(looked) == 0:
+                continue
+            steps = steps_of(devices[index], looked)
+            furthest[looked] = np.maximum(furthest[looked], steps)
+            waiting = waiting[furthest[waiting] < every]
 
     # Each sample is looked at by itself: no result depends on the parts.
     chosen = np.flatnonzero(wanted)
