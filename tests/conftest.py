@@ -43,8 +43,11 @@ def pytest_configure(config: pytest.Config) -> None:
     """Keep the order of the files below, where xdist would sort them by tests.
 
     And no cache: tests write nothing to a home, and patch what keys know nothing of.
+    Workers share the cores already: with threads of their own they wait for each other.
     """
     os.environ["RINGRIG_CACHE"] = ""
+    if hasattr(config, "workerinput"):
+        vars(os)["sched_getaffinity"] = lambda _: {0}
     if hasattr(config.option, "loadscopereorder"):
         config.option.loadscopereorder = False
 
