@@ -166,14 +166,21 @@ def _swapped(
     """
     numbers = np.arange(quotas.regions.n_rows)[:, None]
     of_number = (quotas.regions.row == numbers).astype(np.float32)
+
+    def counted(samples: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """How many of some samples of each row each pose lights."""
+        lit = poses.lit[samples].astype(np.float32)
+        return (of_number[:, samples] @ lit).astype(np.int64)
+
     best: tuple[float, int] = np.inf, 0
     while True:
         swaps: list[tuple[tuple[float, int], NDArray[np.int64]]] = [(best, chosen)]
+        lights = poses.lit[:, chosen].sum(axis=1)
+        gained = counted(lights == 0)
         for i in range(poses.n_existing, len(chosen)):
-            rest = np.delete(chosen, i)
-            lit = np.any(poses.lit[:, rest], axis=1)
-            counts = of_number[:, ~lit] @ poses.lit[~lit].astype(np.float32)
-            counts = counts.astype(np.int64) + quotas.regions.counts(lit)[:, None]
+            rest, own = np.delete(chosen, i), poses.lit[:, chosen[i]]
+            kept = quotas.regions.counts(lights > own)[:, None]
+            counts = gained + counted(own & (lights == 1)) + kept
             missed, total = missed_shares(quotas, counts), counts.sum(axis=0)
             if poses.stock is not None:
                 missed[poses.stock.left(rest)[poses.stock.kinds] <= 0] = np.inf
