@@ -6,6 +6,7 @@ from itertools import groupby, islice
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.rays.rays import equal_parts
 from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.scene import lighting
 from planning.scene.limits.projector_limits import INCIDENCE, LIT
@@ -13,6 +14,8 @@ from planning.scene.measured import LitSamples, measured_by, taken
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
+# Dark samples that a thread takes on together.
+_TOGETHER = 4000
 # Cameras that are asked together for what all before them missed.
 _MOST_AT_ONCE = 64
 
@@ -32,24 +35,26 @@ def furthest_lit(
 def _furthest_lit(
     scene: Scene, projectors: Sequence[PlannedProjector], target: Target
 ) -> NDArray[np.int8]:
-    furthest = np.zeros(len(target), dtype=np.int8)
-    for projector in projectors:
-        pending = np.flatnonzero(furthest < LIT)
-        if not len(pending):
-            break
-        dark = target.take(pending)
-        # What shows its back comes no further than it did before.
-        idle = furthest[pending] >= INCIDENCE
-        idle &= lighting.shows_back(projector, dark)
-        pending, dark = pending[~idle], dark.take(~idle)
-        stage = lighting.first_failure(
-            projector,
-            dark,
-            scene.requirements.projector,
-            scene.occlusion,
-            bodies=scene.bodies,
-        )
-        furthest[pending] = np.maximum(furthest[pending], stage)
+    furthest, limits = np.zeros(len(target), np.int8), scene.requirements.projector
+
+    def search(part: slice) -> None:
+        for projector in projectors:
+            scene.check_cancelled()
+            pending = part.start + np.flatnonzero(furthest[part] < LIT)
+            if not len(pending):
+                break
+            dark = target.take(pending)
+            # What shows its back comes no further than it did before.
+            idle = furthest[pending] >= INCIDENCE
+            idle &= lighting.shows_back(projector, dark)
+            pending, dark = pending[~idle], dark.take(~idle)
+            stage = lighting.first_failure(
+                projector, dark, limits, scene.occlusion, bodies=scene.bodies
+            )
+            furthest[pending] = np.maximum(furthest[pending], stage)
+
+    # Each sample is looked at by itself: no result depends on the parts.
+    scene.occlusion.share(search, equal_parts(len(target), _TOGETHER))
     return furthest
 
 

@@ -13,7 +13,7 @@ from geometry.poses import transform
 from geometry.shapes.primitives import sphere
 from planning.model.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
-from planning.report.reach import furthest_lit
+from planning.report import reach
 from planning.rig.rig import load_rig
 from planning.rings.ring_radii import uniform_radii
 from planning.scene import lighting
@@ -27,7 +27,7 @@ from planning.scene.workspace.candidates import Candidates
 
 
 @pytest.mark.parametrize("light", ["diverging", "parallel"])
-def test_candidates_together_light_what_each_lights_alone(light):
+def test_candidates_together_light_what_each_lights_alone(light, monkeypatch):
     ball = sphere(0.04, subdivisions=3)
     apart = np.array([0.09, 0.0, 0.0])
     pair = TriangleMesh(
@@ -57,8 +57,10 @@ def test_candidates_together_light_what_each_lights_alone(light):
     assert away.mean() > 0.4
     # Of few poses, so that some samples stay dark for each reason.
     few = together[:, 20:26]
-    furthest = furthest_lit(scene, offered[20:26], rows)
-    np.testing.assert_array_equal(furthest, few.max(axis=1))
+    for together in (4000, 70):
+        monkeypatch.setattr(reach, "_TOGETHER", together)
+        furthest = reach.furthest_lit(scene, offered[20:26], rows)
+        np.testing.assert_array_equal(furthest, few.max(axis=1))
     assert len(np.unique(furthest)) >= 3
 
 

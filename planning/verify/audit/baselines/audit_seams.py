@@ -189,8 +189,11 @@ def are_normals(
 
     `reach` is that of the faces.
     """
-    apart = np.linalg.norm(mesh.face_centroids - meeting, axis=1)
-    beside = mesh.face_normals[apart <= reach + _BESIDE * mesh.radius]
+    most = reach + _BESIDE * mesh.radius
+    # Most faces are out of reach along one axis alone.
+    near = np.flatnonzero(np.abs(mesh.face_centroids[:, 0] - meeting[0]) <= most)
+    apart = np.linalg.norm(mesh.face_centroids[near] - meeting, axis=1)
+    beside = mesh.face_normals[near[apart <= most[near]]]
     return all(
         np.any(np.abs(beside - normal).max(axis=1) <= _WRITTEN) for normal in normals
     )
