@@ -146,7 +146,7 @@ def ready_for(
     return replace(ready, scene=scene)
 
 
-def _stage(ready: Prepared, times: int = 1) -> ProjectorStage | None:
+def stage_of(ready: Prepared, times: int = 1) -> ProjectorStage | None:
     """Return the projectors chosen of so many times the candidates; None: no light."""
     rig = ready.request.rig
     number = times * rig.n_projector_poses
@@ -158,7 +158,7 @@ def _stage(ready: Prepared, times: int = 1) -> ProjectorStage | None:
 
 def _with_more(ready: Prepared, times: int) -> tuple[str, int]:
     """Return count and bound with more candidates too, and how many they save."""
-    stages = [_stage(ready, number) for number in (1, times)]
+    stages = [stage_of(ready, number) for number in (1, times)]
     needed = [None if s is None else s.certificate.needed for s in stages]
     if needed[0] is None or needed[1] is None:
         return "nothing lit", 0
@@ -168,7 +168,7 @@ def _with_more(ready: Prepared, times: int) -> tuple[str, int]:
 
 def _cells(ready: Prepared, efforts: list[str]) -> list[tuple[str, int]]:
     """Return the table's cells, and by how many each bound is below its count."""
-    stage = _stage(ready)
+    stage = stage_of(ready)
     if stage is None:
         return [("nothing lit", 0)] * len(efforts)
     return [_cell(ready, stage, EFFORTS[effort]) for effort in efforts]
