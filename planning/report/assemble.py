@@ -51,10 +51,15 @@ def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:
 
 @dataclass(frozen=True, eq=False)
 class Draft:
-    """A plan of which areas are known: advice and certificates are for the last one.
+    """A plan whose areas are known, before advice and certificates are spent on it.
 
     Attributes:
-        devices: Whose poses are rounded as they will be written.
+        partial: What it is written from.
+        devices: With poses rounded as they will be written; areas are of these.
+        claims: What they light and measure of fresh samples.
+        marginal: What other numbers of devices would.
+        survival: What is left of it after losses, where any are to be survived.
+        regions: What becomes of each region.
     """
 
     partial: PartialPlan
@@ -86,62 +91,58 @@ class Draft:
         return self.claims.coverage
 
     def written(self, clock: Stopwatch) -> RigPlan:
-        """Return the plan."""
-        return _written(self, clock)
-
-
-def _written(draft: Draft, clock: Stopwatch) -> RigPlan:
-    partial, devices, claims = draft.partial, draft.devices, draft.claims
-    scene, regions = partial.scene, draft.regions
-    among = scene.among((*devices.projectors, *devices.cameras))
-    coverage, certificates = claims.coverage, _certificates(partial)
-    if not partial.truncated and partial.stationed is None:
-        coverage = with_relaxations(partial, devices, claims, clock)
-        regions = with_floor_relaxations(
-            regions, claims.region_samples, partial.request.rig, devices
+        """Return the plan, with advice and certificates unless it was cut short."""
+        partial, devices, claims = self.partial, self.devices, self.claims
+        scene, regions = partial.scene, self.regions
+        among = scene.among((*devices.projectors, *devices.cameras))
+        coverage, certificates = claims.coverage, _certificates(partial)
+        if not partial.truncated and partial.stationed is None:
+            coverage = with_relaxations(partial, devices, claims, clock)
+            regions = with_floor_relaxations(
+                regions, claims.region_samples, partial.request.rig, devices
+            )
+            if not partial.request.evaluates:
+                regions = with_small_floor(regions, partial.stage.candidates)
+            certificates = with_fewer_needed(certificates, partial, clock)
+        with clock.stage("proofs", "certificates of the bounds over the candidates"):
+            certificates, proof = with_proofs(partial, certificates)
+        stationed = partial.stationed
+        moved = stationed is not None and stationed.record.kind != "heads"
+        overlaps, schedule = overlap_records(among, devices.projectors, moved=moved)
+        surface = surface_of(scene, devices, partial.ready)
+        requirements = _final_requirements(among, claims, devices)
+        told = Told(
+            requirements,
+            coverage,
+            regions,
+            entries.projector_records(among, devices, _rings(partial), claims),
+            entries.camera_records(among, devices.cameras, claims),
+            self.marginal,
+            certificates,
+            _baselines(partial, devices, claims, requirements),
         )
-        if not partial.request.evaluates:
-            regions = with_small_floor(regions, partial.stage.candidates)
-        certificates = with_fewer_needed(certificates, partial, clock)
-    with clock.stage("proofs", "certificates of the bounds over the candidates"):
-        certificates, proof = with_proofs(partial, certificates)
-    stationed = partial.stationed
-    moved = stationed is not None and stationed.record.kind != "heads"
-    overlaps, schedule = overlap_records(among, devices.projectors, moved=moved)
-    surface = surface_of(scene, devices, partial.ready)
-    requirements = _final_requirements(among, claims, devices)
-    told = Told(
-        requirements,
-        coverage,
-        regions,
-        entries.projector_records(among, devices, _rings(partial), claims),
-        entries.camera_records(among, devices.cameras, claims),
-        draft.marginal,
-        certificates,
-        _baselines(partial, devices, claims, requirements),
-    )
-    others: dict[str, Any] = {
-        "ring_axes": entries.axes_record(among, partial, devices, claims),
-        "overlaps": overlaps,
-        "firing_schedule": schedule,
-        "survival": draft.survival,
-    }
-    if stationed is not None:
-        others["stations"] = stations_record(stationed, devices)
-    if partial.request.ranges is not None:
-        others["ranges"] = ranges_record(*partial.request.ranges)
-    mounted = partial.request.mounted
-    if mounted is not None and partial.request.evaluates:
-        broken = violations(scene, (*devices.projectors, *devices.cameras))
-        others["evaluation"] = EvaluationRecord(
-            path=mounted.path, sha256=mounted.sha256, violations=broken
+        others: dict[str, Any] = {
+            "ring_axes": entries.axes_record(among, partial, devices, claims),
+            "overlaps": overlaps,
+            "firing_schedule": schedule,
+            "survival": self.survival,
+        }
+        if stationed is not None:
+            others["stations"] = stations_record(stationed, devices)
+        if partial.request.ranges is not None:
+            others["ranges"] = ranges_record(*partial.request.ranges)
+        mounted = partial.request.mounted
+        if mounted is not None and partial.request.evaluates:
+            broken = violations(scene, (*devices.projectors, *devices.cameras))
+            others["evaluation"] = EvaluationRecord(
+                path=mounted.path, sha256=mounted.sha256, violations=broken
+            )
+        document = document_of(
+            *(partial.ready, surface, claims, told, clock),
+            truncated=partial.truncated,
+            **others,
         )
-    document = document_of(
-        *(partial.ready, surface, claims, told, clock),
-        truncated=partial.truncated,
-        **others,
-    )
-    return RigPlan(document, surface, proof=proof)
+        return RigPlan(document, surface, proof=proof)
 
 
 def _rounded_devices(partial: PartialPlan) -> Devices:
