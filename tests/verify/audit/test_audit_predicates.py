@@ -13,6 +13,7 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
 from planning.model.requirements import ProjectorLimits
 from planning.verify.audit.audit_samples import AuditSamples, draw_samples
+from planning.verify.audit.baselines.audit_seams import are_normals, faces_reach
 from planning.verify.audit.predicates.audit_devices import AuditProjector, light_from
 from planning.verify.audit.predicates.audit_optics import pixel_gradient
 from planning.verify.audit.predicates.occlusion import Shadow
@@ -272,3 +273,18 @@ def test_the_audit_uses_no_method_of_the_device_models():
     text = "\n".join(path.read_text() for path in AUDIT.rglob("*.py"))
     for name in (".project(", ".contains(", ".rays(", ".ray_jacobian(", ".half_panel"):
         assert name not in text
+
+
+def test_normals_at_a_seam_point_are_those_of_faces_beside_it():
+    """At the edge of a box: its other sides aren't, though two of them share its x."""
+    solid = box((0.1, 0.06, 0.04), divisions=8)
+    (_, near, _), (right, _, _) = solid.bounds
+    edge, reach = np.array([right, near, 0.001]), faces_reach(solid)
+
+    def beside(*normal: float) -> bool:
+        normals = np.array([[1.0, 0.0, 0.0], normal])
+        return are_normals(normals, edge, solid, reach)
+
+    assert beside(0.0, -1.0, 0.0)
+    for other in np.vstack([np.eye(3)[1:], -np.eye(3)[::2]]):
+        assert not beside(*other)
