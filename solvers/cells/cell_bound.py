@@ -23,6 +23,9 @@ from .cell_tree import CellTree
 from .cell_tuples import Enough, refute_tuples
 
 DEFAULT_BUDGET = 2e10
+# Multisets of more cells than these were never exhausted, with ten times the work that
+# all else takes: this share of the budget finds what survives, if that is soon found.
+_MOST_CELLS, _BRIEFLY = 5, 0.05
 _MULTIPLIERS_SHARE = 0.75
 # A look for cells that survive: of so many poses at least, as of fewer multipliers soon
 # say all; multisets split at a time; and counted work, beside the budget.
@@ -152,9 +155,15 @@ class _Proof:
         if self.survivor is not None:
             proof = f"{self.proof}; cells that can't be split don't refute {self.lower}"
             return self._answer(CellStatus.SURVIVED, float(self.lower), proof)
-        cut = "memory limit" if self.store.full else self.budget.reason
-        proof = f"{self.proof}; search cut by the {cut}"
+        proof = f"{self.proof}; {self._ended_by()}"
         return self._answer(CellStatus.CUT, float(self.lower), proof)
+
+    def _ended_by(self) -> str:
+        if self.store.full:
+            return "search cut by the memory limit"
+        if self.budget.exhausted:
+            return f"search cut by the {self.budget.reason}"
+        return f"multisets of {self.lower} cells are too many to search for long"
 
     def _look(self, n_poses: int) -> None:
         """Look shortly, where cells serve most, for so many that no search refutes."""
@@ -178,8 +187,11 @@ class _Proof:
             self.lower = int(min(self.search.bound, self.count))
             self.proof = "multipliers of the rows"
             return True
+        budget = self.budget
+        if n_poses > _MOST_CELLS:
+            budget = budget.part(_BRIEFLY * budget.units)
         answer = refute_tuples(
-            self.whole, self.store, n_poses, self.search.multipliers, self.budget
+            self.whole, self.store, n_poses, self.search.multipliers, budget
         )
         if answer.refuted:
             self.lower = n_poses + 1

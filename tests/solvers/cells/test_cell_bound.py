@@ -19,6 +19,7 @@ from support.leaf_trees import (
 )
 
 from solvers.bit_rows import pack_rows, unpack_rows
+from solvers.cells import cell_bound
 from solvers.cells.cell_bound import CellStatus, bound_count
 from solvers.cells.cell_multipliers import MultiplierSearch
 from solvers.cells.cell_problem import CellProblem, whole_rows
@@ -255,6 +256,29 @@ def test_a_cut_bound_is_true_and_says_so():
     answer = bound_count(problem, tree, 9, time_limit=0.0)
     assert answer.proof.endswith("search cut by the time limit")
     assert answer.lower_bound <= fewest(problem, leaves, 8)
+
+
+def test_multisets_of_too_many_cells_are_left_and_said_to_be(monkeypatch):
+    """Where three poses are needed and multipliers prove two of them."""
+    left = 0
+    for seed in range(60):
+        tree, leaves, problem = random_case(20_000 + seed)
+        truth = fewest(problem, leaves, 4)
+        whole = bound_count(problem, tree, 4)
+        with monkeypatch.context() as patch:
+            patch.setattr(cell_bound, "_MOST_CELLS", 1)
+            patch.setattr(cell_bound, "_BRIEFLY", 1e-9)
+            answer = bound_count(problem, tree, 4)
+        assert answer.lower_bound <= whole.lower_bound == min(truth, 4)
+        if answer.status is CellStatus.CUT:
+            left += 1
+            n = int(answer.lower_bound)
+            said = f"multisets of {n} cells are too many to search for long"
+            assert answer.proof.endswith(said)
+            assert n >= 2
+        else:
+            assert answer.lower_bound == whole.lower_bound
+    assert left >= 5
 
 
 NUMBERS = st.one_of(
