@@ -30,7 +30,7 @@ from planning.verify.reconstruction.check.view_check import Ball, reconstruct_vi
 from planning.verify.reconstruction.reconstruct import reconstruct
 from planning.verify.reconstruction.render.countdown import countdown
 from planning.verify.reconstruction.render.mitsuba.physics import Physics
-from planning.verify.reconstruction.render.photometry import Photometry
+from planning.verify.reconstruction.render.photometry import Photometry, assumed_light
 from planning.verify.reconstruction.scanner import Scanner
 
 from .held_figures import WHOLLY, Again, hold_claims, hold_figures
@@ -119,7 +119,9 @@ def verify_plan(
         if differs and comparable(mesh, plan.surface.mesh):
             other = mesh
     recorded = plan.document.reconstruction
-    differs += contradictions(recorded, plan.requirements.check, plan.digest)
+    if recorded is not None:
+        room = assumed_light(Scanner.of(plan)).ambient
+        differs += contradictions(recorded, room, plan.digest)
     how = {"photometry": photometry, "physics": physics}
     pixels = None
     # Pixels need what was recomputed, and no claim.

@@ -7,7 +7,7 @@ import pytest
 from support.handmade import tampered
 from support.plain_shapes import box
 
-from planning import RequirementError, RigPlan, load_rig, plan_rig
+from planning import RequirementError, RigPlan, load_rig, plan_rig, verify_plan
 from planning.report.summary.coverage_lines import coverage_lines
 from planning.report.summary.light_lines import light_lines
 from planning.scene.limits.pair_quality import TERMS
@@ -83,6 +83,17 @@ def test_the_claim_is_what_the_audit_finds(plan):
     assert 0.0 < sigma.median_m <= sigma.p95_m
     assert sigma.p95_m <= plan.requirements.triangulation.max_sigma_m
     assert audit_plan(plan, n_samples=4000).failures == ()
+
+
+def test_a_check_in_the_light_that_the_rig_states_is_held_to_that(plan):
+    """Not to `check.ambient`, which is of rigs whose light nobody knows."""
+    record = verify_plan(plan, threads=1).reconstruction.record()
+    assert record.ambient != pytest.approx(plan.requirements.check.ambient)
+    for ambient, told in ((record.ambient, 0), (1.001 * record.ambient, 1)):
+        document = record.changed(ambient=ambient).to_document()
+        kept = tampered(plan, lambda d, r=document: d.update(reconstruction=r))
+        failures = verify_plan(kept, check_pixels=False, threads=1).failures
+        assert sum("reconstruction.ambient" in line for line in failures) == told
 
 
 FIGURES = [

@@ -6,7 +6,6 @@ from typing import cast
 
 from planning.model.document.check_records import ConfusionRecord, ReconstructionRecord
 from planning.model.document.part import Part
-from planning.model.requirements import CheckLimits
 
 from .audit_findings import AuditFindings
 
@@ -22,6 +21,8 @@ _REPEATABLE = {
     "predicted_missing": (0.25, 0.01),
 }
 _FRACTION_SLACK = 0.025
+# Room light is a mean over projectors, which versions of libraries may round otherwise.
+_ROUNDING = 1e-9
 # What isn't a figure of the check: how it ended, and of which plan it was.
 _VERDICT = re.compile("passed|failures([.].*)?|plan|asked")
 # So many figures that differ are told.
@@ -116,16 +117,15 @@ def _leaves(value: object, key: str = "") -> Iterator[tuple[str, object]]:
 
 
 def contradictions(
-    recorded: ReconstructionRecord | None, limits: CheckLimits, digest: str
+    recorded: ReconstructionRecord, ambient: float, digest: str
 ) -> list[str]:
     """Return where a recorded check contradicts itself, or the plan that it stands in.
 
-    Passed, but with failures; in other room light than is required; of a plan with
-    another digest: a claim, pose, limit or requirement was edited after the check.
+    Passed, but with failures; in other room light than the plan's, a share of the
+    projectors'; of a plan with another digest: a claim, pose, limit or requirement was
+    edited after the check.
     """
     findings = AuditFindings("reconstruction")
-    if recorded is None:
-        return []
     findings.holds(
         recorded.passed is (not recorded.failures),
         "passed",
@@ -139,8 +139,8 @@ def contradictions(
         f"one has {digest[:16]}: what was planned or asked was edited after the check",
     )
     if recorded.ambient is not None:
-        whose = "requirements.check.ambient"
-        findings.same("ambient", recorded.ambient, limits.ambient, whose)
+        whose = "the room light that the plan states"
+        findings.same("ambient", recorded.ambient, ambient, whose, _ROUNDING)
     return list(findings.failures)
 
 
