@@ -16,10 +16,15 @@ from geometry.poses import inverse, transform
 from planning.model.planned import PlannedProjector
 from planning.scene.codes.patterns import RingPattern
 from planning.scene.draws import DRAWS
+from planning.scene.lighting import lit_stages
 from planning.scene.lights import Light, light_of
-from planning.scene.measured import lit_samples
+from planning.scene.limits.projector_limits import LIT
 from planning.scene.samples import merged
 from planning.scene.scene import Scene
+
+# Rings about an axis in the middle may hold more than those about the one before, whose
+# middle is another: so often it is sought at most. Twice is mostly enough.
+_ROUNDS = 8
 
 
 def centred_axes(
@@ -31,25 +36,37 @@ def centred_axes(
     in the unit of radii. One that keeps its rings, or lights nothing, keeps the axis.
     """
     both = merged(scene.target_samples(DRAWS.axes), scene.surface_samples(DRAWS.axes))
-    samples = lit_samples(scene, projectors, both)
-    points = samples.target.samples.points
+    points, turned = both.samples.points, tuple(projectors)
+    lit = lit_stages(scene, turned, both) == LIT
+    for _ in range(_ROUNDS):
+        turned = tuple(map(_turned, turned, (points[column] for column in lit.T)))
+        before, lit = lit, lit_stages(scene, turned, both) == LIT
+        if np.array_equal(lit, before):
+            break
     return tuple(
         one
-        if one.keeps_rings or not samples.lit[:, p].any()
-        else _centred(one, points[samples.lit[:, p]], margin)
-        for p, one in enumerate(projectors)
+        if one.keeps_rings or not column.any()
+        else _cut(one, points[column], margin)
+        for one, column in zip(turned, lit.T, strict=True)
     )
 
 
-def _centred(
-    projector: PlannedProjector, lit: NDArray[np.float64], margin: float
-) -> PlannedProjector:
+def _turned(projector: PlannedProjector, lit: NDArray[np.float64]) -> PlannedProjector:
+    """Return the projector with its ring axis in the middle of lit points, (n, 3)."""
+    if projector.keeps_rings or not len(lit):
+        return projector
     light, pose = light_of(projector.device), projector.world_from_device
     axis = light.axis_of(_middle(light, transform(inverse(pose), lit)))
-    turned = replace(projector, world_from_ring=pose @ light.ring_frame(axis))
-    radii, reach = turned.ring_radii, RingPattern(turned).coordinate(lit).max()
+    return replace(projector, world_from_ring=pose @ light.ring_frame(axis))
+
+
+def _cut(
+    projector: PlannedProjector, lit: NDArray[np.float64], margin: float
+) -> PlannedProjector:
+    """Return the projector with the rings that reach so far beyond lit points."""
+    radii, reach = projector.ring_radii, RingPattern(projector).coordinate(lit).max()
     count = max(2, int(np.searchsorted(radii, reach + margin)) + 1)
-    return replace(turned, ring_radii=radii[:count])
+    return replace(projector, ring_radii=radii[:count])
 
 
 def _middle(light: Light, local: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -26,8 +26,10 @@ from planning.rings.ring_shares import ring_shares
 from planning.rings.ring_stage import space_rings
 from planning.scene import measurability
 from planning.scene.codes.patterns import pattern_of
-from planning.scene.draws import Draw
+from planning.scene.draws import DRAWS, Draw
+from planning.scene.lighting import lit_stages
 from planning.scene.lights import ring_frame
+from planning.scene.limits.projector_limits import LIT
 from planning.scene.measured import lit_samples, measured_by
 
 RADIUS = 0.1
@@ -296,6 +298,20 @@ def test_a_centred_axis_runs_through_the_middle_of_what_is_lit(bench):
     assert len(wider.ring_radii) == len(centred.ring_radii) + 3
     kept = replace(projector, keeps_rings=True)
     assert centred_axes(scene, [kept], 0.0) == (kept,)
+
+
+def test_a_centred_axis_is_in_the_middle_of_what_its_own_rings_light(bench):
+    """Rings about the axis before reach one side of the ball alone."""
+    scene, projector, _ = bench
+    (centred,) = centred_axes(scene, [projector], 0.0)
+    few = replace(projector, ring_radii=centred.ring_radii)
+    lit = lit_stages(scene, [few, centred], scene.target_samples(DRAWS.axes)) == LIT
+    assert lit[:, 0].sum() < 0.97 * lit[:, 1].sum()
+    (again,) = centred_axes(scene, [few], 0.0)
+    frame = again.world_from_ring
+    towards = -frame[:3, 3]
+    off = np.linalg.norm(towards - (towards @ frame[:3, 2]) * frame[:3, 2])
+    assert off < 0.002
 
 
 def test_a_part_of_a_ring_beyond_the_panel_lands_nowhere():

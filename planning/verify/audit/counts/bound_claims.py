@@ -86,7 +86,11 @@ def audit_areas(
     required = kind.share * kind.reachable_m2
     # What was reachable then is between what is and what was at most.
     required = min(max(claims.required_m2, required), kind.share * reachable)
-    findings.number("required_m2", claims.required_m2, required, slack)
+    # Cameras are chosen on what is lit of a draw of the whole target.
+    part = case.plan.coverage.target.lit_m2 / whole if kind.name == "camera" else 1.0
+    drawn = round(claims.n_samples / max(part, 1.0 / _FEWEST_SAMPLES))
+    doubt = max(slack, kind.share * _noise(drawn, reachable, whole))
+    findings.number("required_m2", claims.required_m2, required, doubt)
     best, fewer = claims.best_area.upper_bound_m2, claims.one_fewer
     room = _noise(claims.n_samples, reachable, whole)
     findings.holds(
