@@ -178,7 +178,7 @@ def _audit_cone(
 ) -> None:
     """The angle about the mean normal that holds 98 % of a region's area.
 
-    Where that is the area of a few equal faces, rounding says if one more is needed.
+    Where some faces hold just that, rounding says if one more is needed.
     """
     off = np.arccos(np.clip(normals @ np.array(region.mean_normal), -1.0, 1.0))
     order = np.argsort(off)
