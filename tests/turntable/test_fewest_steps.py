@@ -138,17 +138,22 @@ def test_devices_may_stand_between_the_angles_of_a_table(seed, n_eyes, stride):
     assert _enough(search, steps.lamps, steps.eyes, steps.angles)
 
 
-def test_a_cut_search_finds_steps_and_claims_no_more_than_it_proved(monkeypatch):
+@pytest.mark.parametrize("limit", ["_ALL", "_STOOD"])
+def test_a_cut_search_finds_steps_and_claims_no_more_than_it_proved(monkeypatch, limit):
     """As good as nothing is looked at; what is found is enough, and no bound false."""
     module = "planning.cameras.stations.turntable.fewest_steps"
-    monkeypatch.setattr(f"{module}._ALL", 1)
+    cut = 0
     for seed in range(4):
-        search = _search(seed)
-        steps, least = search.fewest(1, 2, ANGLES)
+        search = _crowded(seed) if limit == "_STOOD" else _search(seed)
+        with monkeypatch.context() as patch:
+            patch.setattr(f"{module}.{limit}", 1)
+            steps, least = search.fewest(1, 2, ANGLES)
         truth = _brute(search, 1, 2)
+        cut += steps.proof != "every choice of places and angles"
         assert least <= truth <= len(steps.angles)
         assert steps.lower_bound == least
         assert _enough(search, steps.lamps, steps.eyes, steps.angles)
+    assert cut
 
 
 class _Crowded(_Room):

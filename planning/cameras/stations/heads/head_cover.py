@@ -179,7 +179,11 @@ class HeadCover:
 
     def lacking(self, chosen: Ints) -> int:
         """Return how many rows are lacking of all that is asked, at least 0."""
-        served = self.covers[:, chosen].any(axis=1)
+        lit, measured = (
+            done[:, chosen].any(axis=1)[self.rows]
+            for done in (self.sets.lit, self.sets.measured)
+        )
+        served = np.where(self.of_light, lit, measured)
         counts = np.bincount(
             self.quotas.regions.row[served], minlength=len(self.quotas.floors)
         )

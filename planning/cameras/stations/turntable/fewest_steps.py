@@ -31,9 +31,9 @@ from .table_sets import Place, TableSets
 
 _BUDGET = 2e8
 # Sets of angles at most that are looked at, for all places of as many projectors, and
-# of which cameras are tried; of more the number isn't proved. After some, steps that
-# are enough are looked for in another way.
-_ALL, _TRIED = 20_000_000, 4000
+# of which cameras are tried, so many choices of these; of more the number isn't proved.
+# After some, steps that are enough are looked for in another way.
+_ALL, _TRIED, _STOOD = 20_000_000, 4000, 100_000
 _SOON = 1_000_000
 # Of each choice of projectors so many are tried before others have their turn, and in
 # its next turn so many times as many.
@@ -73,7 +73,7 @@ class StepSearch:
         if not kept:
             return None, most + 1
         least, refuted = self._least(n_lamps, most), True
-        spent = Spent(_ALL, _TRIED)
+        spent = Spent(_ALL, _TRIED, _STOOD)
         best: Steps | None = None
         for count in range(least, most + 1):
             if (found := self._at(kept, count, n_eyes, spent)) is not None:
@@ -170,6 +170,7 @@ class StepSearch:
                 if spent.all_tried or n > end:
                     return None, False
                 eyes = tuple(near[k] for k in chosen)
+                spent.stood += 1
                 if (found := self._stand.enough(lamps, eyes, row)) is not None:
                     return found, True
                 spent.tried += crowded

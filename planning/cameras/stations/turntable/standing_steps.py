@@ -50,7 +50,8 @@ class StandingSteps:
     ) -> Steps | None:
         """Places in the room, if it holds them and floors of regions are met, too."""
         cover, n = self.cover, self.sets.lattice.n_places
-        if replace(cover, sets=self.sets.steps_of(lamps, eyes)).lacking(angles):
+        free = self.sets.steps_of(lamps, eyes, angles=angles)
+        if replace(cover, sets=free).lacking(np.arange(len(angles))):
             return None
         for by, sets in self.standing(lamps, eyes, angles):
             if replace(cover, sets=sets).lacking(angles):

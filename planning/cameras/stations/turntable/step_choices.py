@@ -20,19 +20,22 @@ class Spent:
     """Sets of angles looked at, and tried with cameras; whether it ended there.
 
     Attributes:
-        most_looked: How many may be looked at; `most_tried` likewise.
+        most_looked: How many may be looked at; `most_tried` likewise, and `most_stood`
+            of the choices of cameras for them.
     """
 
     most_looked: int
     most_tried: int
+    most_stood: int
     looked: int = 0
     tried: int = 0
+    stood: int = 0
     cut: bool = False
 
     @property
     def all_tried(self) -> bool:
         """Whether no more may be tried."""
-        return self.tried >= self.most_tried
+        return self.tried >= self.most_tried or self.stood >= self.most_stood
 
     @property
     def is_over(self) -> bool:

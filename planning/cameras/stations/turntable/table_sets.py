@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from geometry.arrays import Mask
+from geometry.arrays import Ints, Mask
 from planning.cameras.stations.heads.head_cover import HeadSets
 from planning.scene.camera_views import camera_views
 from planning.scene.lighting import lit_stages
@@ -74,17 +74,20 @@ class TableSets:
         lamps: Sequence[Place],
         eyes: Sequence[Place] | None,
         clear: Mask | None = None,
+        *,
+        angles: Ints | None = None,
     ) -> HeadSets:
         """Return what devices do at each angle of the table, (n, A).
 
         At angle j they are seen j places back. Cameras None: any. Where a line to a
-        sample isn't `clear`, as `TableRoom.clear` says, a device does nothing.
+        sample isn't `clear`, as `TableRoom.clear` says, a device does nothing. Of some
+        angles alone, (k,): columns are these, (n, k).
         """
         places, n = self.lattice.n_places, len(self.target)
-        back = -np.arange(places)
+        back = -(np.arange(places) if angles is None else angles)
         if clear is None:
             clear = np.ones((len(lamps) + len(eyes or ()), 1, 1), dtype=bool)
-        lit, measured = np.zeros((2, places, n), dtype=bool)
+        lit, measured = np.zeros((2, len(back), n), dtype=bool)
         for (e, i), free in zip(lamps, clear, strict=False):
             at = (i + back) % places
             lit |= self.lit[e, at] & free
