@@ -179,11 +179,9 @@ class HeadCover:
 
     def lacking(self, chosen: Ints) -> int:
         """Return how many rows are lacking of all that is asked, at least 0."""
-        lit, measured = (
-            done[:, chosen].any(axis=1)[self.rows]
-            for done in (self.sets.lit, self.sets.measured)
-        )
-        served = np.where(self.of_light, lit, measured)
+        lit = np.any(self.sets.lit[:, chosen], axis=1)
+        measured = np.any(self.sets.measured[:, chosen], axis=1)
+        served = np.where(self.of_light, lit[self.rows], measured[self.rows])
         counts = np.bincount(
             self.quotas.regions.row[served], minlength=len(self.quotas.floors)
         )
