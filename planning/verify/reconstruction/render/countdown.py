@@ -4,6 +4,8 @@ import math
 import time
 from collections.abc import Callable
 
+from planning.model.words import count_words
+
 # One pair's frames, drawn and decoded, take as long as that many views of a camera are
 # cast: 0.8 to 2.2 on the sample and the horse.
 _VIEWS_A_PAIR = 1.4
@@ -25,7 +27,7 @@ def countdown(
         if done == 0:
             left = math.ceil(_VIEWS_A_PAIR * spent * total / n_cameras)
             begin = time.monotonic()
-            say(f"{total} pairs on {threads} threads, about {left} s")
+            say(f"{total} pairs on {count_words(threads, 'thread')}, about {left} s")
             return
         # When the first is done, so are others beside it.
         left = math.ceil(spent * (total - done) / min(done + threads - 1, total))
