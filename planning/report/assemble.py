@@ -1,7 +1,8 @@
 """Turns a partial plan into a plan: poses rounded, every claim recomputed from them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 from planning.cameras.baselines.baseline_rows import baseline_rows
 from planning.cameras.baselines.seams import SampledSurface
@@ -39,6 +40,30 @@ from .entries import device_entries as entries
 from .judged import Devices
 from .marginal import marginal_records, of_numbers
 from .partial_plan import PartialPlan
+
+
+class Claimed(Protocol):
+    """A plan, or the draft of one: what is asked, and what comes of fresh samples."""
+
+    @property
+    def requirements(self) -> Requirements:
+        """What is asked of the plan."""
+        ...
+
+    @property
+    def coverage(self) -> Coverage:
+        """Areas of the surface and the target."""
+        ...
+
+    @property
+    def regions(self) -> Sequence[RegionRecord]:
+        """What becomes of each region."""
+        ...
+
+    @property
+    def survival(self) -> SurvivalRecord | None:
+        """What is left after losses, where any are to be survived."""
+        ...
 
 
 def write_plan(partial: PartialPlan, clock: Stopwatch) -> RigPlan:

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Protocol
 
 from planning.cameras.axis_choice import other_axes, place_for_axes
 from planning.cameras.baselines.widest_baselines import WidestBaselines
@@ -15,12 +14,9 @@ from planning.cameras.camera_stage import CameraSolution, follow_cameras
 from planning.cameras.free_cameras import has_room, one_camera_fewer
 from planning.cameras.proved_cameras import CameraStage, bound_stage
 from planning.model.document.certificates import Certificate
-from planning.model.document.coverage_records import Coverage, RegionRecord
 from planning.model.document.ring_records import RingAxis
-from planning.model.document.survival_records import SurvivalRecord
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.progress import Stopwatch
-from planning.model.requirements import Requirements
 from planning.projectors.candidate_set import NothingLitError
 from planning.projectors.projector_stage import ProjectorStage
 from planning.proofs import camera_bound, projector_bound
@@ -29,36 +25,13 @@ from planning.report.advice.camera_relaxations import nothing_measured
 from planning.report.advice.projector_relaxations import nothing_lit
 from planning.report.advice.standing_inside import standing_inside
 from planning.report.advice.what_helps import falls_short
+from planning.report.assemble import Claimed
 from planning.report.partial_plan import PartialPlan, Prepared
 from planning.report.region_claims import below_floor
 from planning.rings.acquisition import pixels_read
 from planning.rings.kept_pairs import rings_for_pairs
 
 from .recalled import fewest_projectors, proved_projectors, widened_projectors
-
-
-class Claimed(Protocol):
-    """A plan, or the draft of one: what is asked, and what comes of fresh samples."""
-
-    @property
-    def requirements(self) -> Requirements:
-        """What is asked of the plan."""
-        ...
-
-    @property
-    def coverage(self) -> Coverage:
-        """Areas of the surface and the target."""
-        ...
-
-    @property
-    def regions(self) -> Sequence[RegionRecord]:
-        """What becomes of each region."""
-        ...
-
-    @property
-    def survival(self) -> SurvivalRecord | None:
-        """What is left after losses, where any are to be survived."""
-        ...
 
 
 def first_projectors(ready: Prepared, clock: Stopwatch) -> ProjectorStage:

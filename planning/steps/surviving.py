@@ -17,10 +17,11 @@ from planning.projectors.surviving_projectors import surviving_projectors
 from planning.proofs import camera_bound, projector_bound
 from planning.proofs.candidate_certificate import counted
 from planning.proofs.surviving_counts import SurvivingCount
+from planning.report.assemble import Claimed
 from planning.report.entries.survival_entries import falls_short_after
 from planning.report.partial_plan import PartialPlan, PlanRequest, Prepared
 
-from .stages import Claimed, placed
+from .stages import placed
 
 
 def check_survival(request: PlanRequest) -> None:

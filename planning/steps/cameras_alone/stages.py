@@ -11,12 +11,11 @@ from planning.model.progress import Stopwatch
 from planning.proofs import camera_bound
 from planning.proofs.candidate_certificate import larger
 from planning.report.advice.standing_inside import standing_inside
-from planning.report.advice.what_helps import falls_short
 from planning.report.partial_plan import PlanRequest
-from planning.report.region_claims import below_floor
 from planning.rig.devices.lens_fit import check_fields
 from planning.steps.best_kept import Keep, Search, Whole, best_kept
 from planning.steps.prepare import prepared
+from planning.steps.stages import short_of
 
 from .view_document import ViewPlan, write_view_plan
 
@@ -91,17 +90,10 @@ def _one_camera_more(
 
     The proved bound stays what it is; the count is then above it, and says so.
     """
-    required, areas = plan.requirements, plan.coverage.target
-    short = falls_short(
-        areas.measured_m2, areas.reachable_by_cameras_m2, required.coverage
-    ) or any(
-        below_floor(region.coverage, required.region_coverage)[1]
-        for region in plan.document.regions
-        if region.coverage is not None and region.coverage.floor == "missed"
-    )
-    if not short:
+    _, unmeasured = short_of(plan)
+    if not unmeasured:
         return None
-    stage = larger(partial.stage, partial.cameras, required.max_cameras)
+    stage = larger(partial.stage, partial.cameras, plan.requirements.max_cameras)
     if stage is None:
         return None
     clock.say("  fresh samples fall short: one camera more")
