@@ -213,7 +213,8 @@ class _Refutation:
             best = group[np.argmax(paid[group])]
             most += float(paid[best])
             paid[best] = -1.0
-        spare = self.n_sets - len(part.groups)
+        # There may be fewer sets than may be taken.
+        spare = min(self.n_sets - len(part.groups), paid.size)
         if spare:
             others = np.where(part.closed, 0.0, np.maximum(paid, 0.0))
             most += float(np.partition(others, -spare)[-spare:].sum())

@@ -26,6 +26,16 @@ def test_certificates_are_made_and_hold_where_they_are_true(
     assert certificate(covers, n_sets, best, budget=1e7) is None
 
 
+@pytest.mark.parametrize("n_kept", [1, 2, 4])
+def test_more_sets_than_there_are_cover_what_all_cover(n_kept: int) -> None:
+    covers = random_cover(n_kept)[:, 2 : 2 + n_kept]
+    most = int(covers.any(axis=1).sum())
+    proof = certificate(covers, 5, most + 1)
+    assert proof is not None
+    refute(covers, proof, most + 1)
+    assert certificate(covers, 5, most, budget=1e7) is None
+
+
 def test_a_certificate_of_fewer_sets_doesnt_do_for_more() -> None:
     covers = random_cover(3)
     best = best_of(covers, 3)
