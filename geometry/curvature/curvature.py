@@ -89,11 +89,16 @@ def principal_curvatures(
         if field is None:
             radius = DEFAULT_RADIUS_SHARE * mesh.size
             field = _curvatures(mesh, radius, max(radius, facet_size(mesh)))
-            _KNOWN[mesh] = field
+            know_curvatures(mesh, field)
         return field
     if not (radius > 0 and np.isfinite(radius)):
         raise ValueError(f"radius must be a positive number of metres, got {radius}")
     return _curvatures(mesh, radius, radius)
+
+
+def know_curvatures(mesh: TriangleMesh, field: CurvatureField) -> None:
+    """Let `principal_curvatures` return a field that was kept of the same mesh."""
+    _KNOWN[mesh] = field
 
 
 def facet_size(mesh: TriangleMesh) -> float:

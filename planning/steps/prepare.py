@@ -5,7 +5,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.curvature.curvature import CurvatureField, principal_curvatures
+from geometry.curvature.curvature import (
+    CurvatureField,
+    know_curvatures,
+    principal_curvatures,
+)
 from geometry.devices import DeviceModel
 from geometry.mesh.bearing import bearing
 from geometry.regions.regions import DominantRegions, dominant_regions
@@ -74,6 +78,8 @@ def prepared_for(
         field = request.cache.recall(
             "principal_curvatures", (mesh,), lambda: principal_curvatures(mesh)
         )
+        # The report asks for them, too.
+        know_curvatures(mesh, field)
         regions = _regions(request, field)
         clock.say(f"  {len(regions)} regions, {regions.dominant_share:.1%} of the area")
     scene = Scene(

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from support.plain_shapes import box
 
+from geometry.curvature import curvature
 from planning import Cache, load_rig, plan_rig, prepare
 from planning.handover.handed_plan import HandedPlan
 from planning.steps.recalled_mesh import recalled_mesh
@@ -124,6 +125,10 @@ def test_another_rig_finds_nothing_of_the_first(rig):
     other = rig.replace(limits={"projector_max_incidence_deg": 50.0})
     plan_rig(box((0.1, 0.06, 0.03)), rig, cache=cache, **asked)
     cached = plan_rig(box((0.1, 0.06, 0.03)), other, cache=cache, **asked)
+    with pytest.MonkeyPatch.context() as patch:
+        # The report draws the curvatures that were found.
+        patch.setattr(curvature, "_curvatures", None)
+        assert curvature.principal_curvatures(cached.surface.mesh).valid.size
     bare = plan_rig(box((0.1, 0.06, 0.03)), other, **asked)
     _same(cached.to_document(), bare.to_document())
 
