@@ -16,11 +16,17 @@ from planning.verify.audit.coverage import inside_claims
 
 # Of the work on bounds over all poses, which most plans spend most of their time on.
 _SHARE = 0.1
-# Samples that claims rest on, and that confirm what others were fitted to. Covers are
-# chosen, and rings spaced, on as many as ever.
+# Samples that devices, rings and claims rest on, and that confirm what others were
+# fitted to.
 _FEW = {
-    "claims": 3000,
-    "overlaps": 3000,
+    "site": 1000,
+    "projectors": 1200,
+    "cameras": 1200,
+    "axes": 2000,
+    "surer": 2000,
+    "rings": 3000,
+    "claims": 2500,
+    "overlaps": 2500,
     "fresh_projectors": 4000,
     "fresh_cameras": 2000,
     "baselines": 2000,
