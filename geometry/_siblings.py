@@ -1,8 +1,8 @@
 """Refuse to run against a stranger's package under one of our names.
 
 The three top-level packages carry generic names, so another distribution can shadow or
-overwrite one of them silently. The same file stands in each package, because
-``geometry`` and ``solvers`` may not import each other, nor ``planning``.
+overwrite one of them silently. The same file stands in two packages, because
+``geometry`` and ``solvers`` may not import each other.
 """
 
 from importlib.util import find_spec

@@ -3,7 +3,11 @@
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from ._siblings import check_siblings
+try:
+    from geometry._siblings import check_siblings
+except ModuleNotFoundError:
+    # Of a stranger's `geometry` the other one tells.
+    from solvers._siblings import check_siblings
 
 if TYPE_CHECKING:
     from geometry.files.readers import load_mesh as load_mesh

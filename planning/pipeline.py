@@ -25,16 +25,17 @@ from planning.rig.rig import Rig
 from planning.rig.wishes import AccuracyOf, Pattern, TargetName, Wishes
 from planning.scene.interest import Select, Weight
 from planning.scene.ranges.ranged_body import RangedBody
+from planning.steps.stations.carried import devices_of_heads, pattern_of_rig
+from planning.steps.stations.heads import heads_sought
+from planning.steps.stations.turntable import steps_sought
 
 from .steps.asked.request import request_of
 from .steps.best_kept import Keep, Search, best_kept
 from .steps.cameras_alone.stages import planned_alone
-from .steps.carried import devices_of_heads, pattern_of_rig
 from .steps.checked import Checked, axes_may_help, checked_plan, missed_by
 from .steps.family.family_plan import with_members
 from .steps.family.family_search import FamilyDraft, family_sought
 from .steps.front.taken_point import TakenPoint
-from .steps.heads import heads_sought
 from .steps.joint.joining import jointly
 from .steps.prepare import prepared, standing_devices
 from .steps.refused import check_request
@@ -50,7 +51,6 @@ from .steps.stages import (
 )
 from .steps.standing import as_they_stand
 from .steps.surviving import one_more_for_losses, placed_to_survive
-from .steps.turntable import steps_sought
 
 
 def plan_rig(

@@ -34,7 +34,7 @@ from geometry.devices import PinholeModel
 from geometry.files.readers import load_mesh
 from geometry.poses import look_at
 from planning import load_rig
-from planning.model.planned import PlannedProjector
+from planning.model.devices.planned import PlannedProjector
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Workspace
 from planning.projectors.projector_poses import widen_margins
@@ -44,7 +44,7 @@ from planning.proofs.cells.image_cone import image_cone
 from planning.report.partial_plan import PlanRequest
 from planning.rig.wishes import Wishes
 from planning.scene.draws import Draw
-from planning.scene.measured import LitSamples, lit_samples
+from planning.scene.measuring.measured import LitSamples, lit_samples
 from planning.scene.scene import Scene
 from planning.steps.prepare import prepared
 from planning.steps.stages import first_projectors

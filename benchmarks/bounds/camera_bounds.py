@@ -29,8 +29,8 @@ from planning import load_rig
 from planning.cameras.camera_cover import camera_candidate_views
 from planning.cameras.camera_stage import place_cameras
 from planning.cameras.proved_cameras import bound_stage
+from planning.model.devices.planned import PlannedCamera
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.planned import PlannedCamera
 from planning.model.progress import Stopwatch
 from planning.projectors.projector_poses import widen_margins
 from planning.proofs.camera_bound import DEFAULT, PROVE

@@ -43,14 +43,14 @@ from geometry.shapes.primitives import sphere
 from planning import load_mesh, load_rig
 from planning.cameras.camera_baselines import BaselineSamples, baseline_limits
 from planning.cameras.camera_cover import camera_candidate_views, measured_of
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.progress import Stopwatch
 from planning.report.partial_plan import PlanRequest, Prepared
 from planning.rig.rig import Rig
 from planning.rig.wishes import Wishes
-from planning.scene.camera_views import CandidateViews
 from planning.scene.draws import Draw
-from planning.scene.measured import LitSamples, taken
+from planning.scene.measuring.camera_views import CandidateViews
+from planning.scene.measuring.measured import LitSamples, taken
 from planning.scene.scene import Scene
 from planning.steps.prepare import prepared
 
@@ -306,7 +306,7 @@ def _old(projectors: Path, name: str) -> int:
     from planning.cameras.camera_cover import candidate_cover
     from planning.cameras.paper import one_fewer_camera, paper_cameras, paper_route
     from planning.proofs.selection import fewest_count, select_fewest
-    from planning.scene.measured import measured_by
+    from planning.scene.measuring.measured import measured_by
 
     rig, ready = _prepared(name)
     saved = np.load(projectors, allow_pickle=True)

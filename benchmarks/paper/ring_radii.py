@@ -20,7 +20,7 @@ import numpy as np
 from benchmarks.machine import machine
 from geometry.files.readers import load_mesh
 from planning import RequirementError, load_rig, plan_rig
-from planning.model.planned import PlannedProjector
+from planning.model.devices.planned import PlannedProjector
 from planning.rings.beam_profile import cast_beam
 from planning.rings.ring_creases import Creases, find_creases
 from planning.rings.ring_limits import ring_beam

@@ -7,7 +7,7 @@ from PIL import Image
 from geometry.poses import inverse, transform
 from geometry.rays.rays import RayCaster
 from geometry.shapes.primitives import sphere
-from planning.model.planned import PlannedProjector
+from planning.model.devices.planned import PlannedProjector
 from planning.report.drawing.panel import Panel
 
 from .drawing import (

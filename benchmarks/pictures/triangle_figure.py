@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
+from planning.model.devices.planned import PlannedCamera
 from planning.model.document.device_records import BaselineRow
-from planning.model.planned import PlannedCamera
 from planning.report.drawing.panel import INK, Panel, font
 from planning.report.drawing.picture_view import (
     BACKGROUND,

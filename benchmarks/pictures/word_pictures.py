@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.report.drawing.panel import INK, Panel, font
 from planning.report.drawing.picture_view import BACKGROUND, SUPERSAMPLING, Colour
 from planning.report.drawing.shader import Shader

@@ -23,7 +23,7 @@ from support.simulated_rigs import ONE_EACH, off_by, triangulated
 from benchmarks.bounds.continuous_bounds import jobs
 from benchmarks.pixels.calibration_deciles import BestPairs
 from planning import RequirementError, load_mesh, load_rig, plan_rig
-from planning.model.calibration_errors import PERFECT
+from planning.model.devices.calibration_errors import PERFECT
 from planning.model.plan import RigPlan
 from planning.rig.rig import Rig
 from planning.rig.rig_tables import CalibrationTable

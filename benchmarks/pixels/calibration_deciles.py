@@ -21,12 +21,12 @@ from support.simulated_rigs import off_by, scales, triangulated
 
 from geometry.files.readers import load_mesh
 from planning import RequirementError, load_rig, plan_rig
-from planning.model.calibration_errors import PERFECT, CalibrationErrors
+from planning.model.devices.calibration_errors import PERFECT, CalibrationErrors
 from planning.model.plan import RigPlan
 from planning.rig.rig_tables import CalibrationTable
-from planning.scene.camera_views import view_of
 from planning.scene.draws import Draw
-from planning.scene.measured import lit_samples, pairs_of
+from planning.scene.measuring.camera_views import view_of
+from planning.scene.measuring.measured import lit_samples, pairs_of
 from planning.scene.scene import Scene
 
 _Array = NDArray[np.float64]

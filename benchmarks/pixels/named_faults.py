@@ -21,7 +21,7 @@ from support.simulated_edges import simulated_edges
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.proximity import closest_points
-from planning.model.calibration_errors import CalibrationErrors
+from planning.model.devices.calibration_errors import CalibrationErrors
 from planning.model.plan import RigPlan
 from planning.verify.audit.coverage.prediction import predict_measured
 from planning.verify.reconstruction.captures.captured import reconstruct_rendered

@@ -15,7 +15,7 @@ from support import reconstruction_rigs as rigs
 from verify.reconstruction.test_reconstruction_decode import edge_error_px, plate
 
 from geometry.rays.rays import RayCaster
-from planning.model.planned import edge_linearity_px
+from planning.model.devices.planned import edge_linearity_px
 from planning.verify.reconstruction.calibration import (
     PairCalibration,
     calibrate_camera,

@@ -24,10 +24,11 @@ from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import look_at
 from geometry.rays.proximity import closest_points
 from geometry.shapes.primitives import sphere
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import CameraLimits, TriangulationLimits
-from planning.scene import lighting, measurability
+from planning.scene import lighting
 from planning.scene.codes.patterns import pattern_of
+from planning.scene.measuring import measurability
 from planning.scene.samples import Target
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.render.photometry import Photometry

@@ -32,8 +32,8 @@ from planning import load_mesh, load_rig, verify_plan
 from planning.cameras.camera_cover import camera_candidate_views
 from planning.cameras.camera_routes import widest_routes
 from planning.cameras.camera_stage import CameraSolution, place_cameras
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.document.certificates import CamerasBy
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.progress import Stopwatch
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import ProjectorStage
@@ -41,7 +41,7 @@ from planning.report.assemble import write_plan
 from planning.report.partial_plan import PartialPlan, PlanRequest, Prepared
 from planning.rig.wishes import Wishes
 from planning.scene.draws import Draw
-from planning.scene.measured import lit_samples, measured_by
+from planning.scene.measuring.measured import lit_samples, measured_by
 from planning.scene.scene import Scene
 from planning.steps.prepare import prepared
 from planning.steps.stages import first_projectors, polished

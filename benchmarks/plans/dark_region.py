@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from benchmarks.bounds.continuous_bounds import jobs
 from geometry.curvature.refinement import cut_for_curvature
 from planning import load_mesh, load_rig
-from planning.model.device_poses import moved_to
-from planning.model.planned import PlannedProjector
+from planning.model.devices.device_poses import moved_to
+from planning.model.devices.planned import PlannedProjector
 from planning.model.progress import Stopwatch
 from planning.projectors.candidate_set import CandidateSet, CandidateSource
 from planning.proofs.quotas import Quotas, RegionFloors

@@ -15,7 +15,7 @@ import sys
 import numpy as np
 from support.head_figures import HEADS, figures_of
 
-from planning.model.heads import Head
+from planning.model.devices.heads import Head
 from planning.rig.rig import Rig, load_rig
 
 _COLUMNS = (

@@ -23,7 +23,7 @@ from benchmarks.bounds.continuous_bounds import jobs, ready_for
 from benchmarks.machine import machine
 from geometry.curvature.refinement import cut_for_curvature
 from geometry.files.readers import load_mesh
-from planning.model.device_poses import moved_to, rounded_pose
+from planning.model.devices.device_poses import moved_to, rounded_pose
 from planning.model.errors import InfeasibleLimitsError
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import plan_projectors

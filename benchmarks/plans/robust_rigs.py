@@ -21,7 +21,7 @@ from benchmarks.pixels.calibrated_plans import MANY, NAMES, STATED, Found, state
 from benchmarks.pixels.calibration_deciles import BestPairs
 from geometry.parallel import n_threads
 from planning import RequirementError, load_mesh, plan_rig
-from planning.model.calibration_errors import AS_PLANNED
+from planning.model.devices.calibration_errors import AS_PLANNED
 from planning.model.plan import RigPlan
 from planning.report.tolerance.asked import Asked
 from planning.report.tolerance.built_case import BuiltCase

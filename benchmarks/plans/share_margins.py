@@ -23,8 +23,8 @@ from benchmarks.machine import machine
 from geometry.curvature.refinement import cut_for_curvature
 from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
+from planning.model.devices.planned import PlannedProjector
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.planned import PlannedProjector
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import ProjectorStage, plan_projectors
 from planning.projectors.share_margin import margin_at_share

@@ -13,8 +13,8 @@ import numpy as np
 from pydantic import BaseModel
 
 from geometry.mesh.mesh import TriangleMesh
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.installed import sources_hash, versions
-from planning.model.planned import PlannedCamera, PlannedProjector
 
 _Update = Callable[[bytes | memoryview], None]
 

@@ -10,16 +10,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.document.certificates import CamerasBy
 from planning.model.document.ring_records import AxisTaken, RingAxis
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.selection import fewest_count, fewest_of
 from planning.rings.acquisition import pixels_read
 from planning.rings.axis_moves import move_ring_axes
 from planning.rings.centred_axes import centred_axes
 from planning.rings.idle_rings import without_idle
-from planning.scene.camera_views import CandidateViews
-from planning.scene.measured import LitSamples, lit_samples
+from planning.scene.measuring.camera_views import CandidateViews
+from planning.scene.measuring.measured import LitSamples, lit_samples
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 

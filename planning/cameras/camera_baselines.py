@@ -14,14 +14,14 @@ from planning.cameras.baselines.widest_baselines import (
     BaselineSearch,
     WidestBaselines,
 )
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.proofs.losses import PairDemand
 from planning.proofs.quotas import Quotas, RegionFloors
 from planning.scene.bodies.clearance import lacks_clearance
 from planning.scene.draws import DRAWS
 from planning.scene.limits.calibration_terms import surface_deviation
-from planning.scene.measurability import expected_noise_px, expected_sigma_m
-from planning.scene.measured import (
+from planning.scene.measuring.measurability import expected_noise_px, expected_sigma_m
+from planning.scene.measuring.measured import (
     LitSamples,
     lit_samples,
     measured_by,

@@ -12,10 +12,10 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.conflicts import Interference, resolve_conflicts
-from planning.scene.measured import LitSamples, measured_by, taken
+from planning.scene.measuring.measured import LitSamples, measured_by, taken
 from planning.scene.placed_bodies import blocked_by, bodies_of
 from planning.scene.scene import Scene
 

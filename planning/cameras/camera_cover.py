@@ -6,18 +6,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.words import stopped_words
 from planning.proofs.conflicts import Interference
 from planning.proofs.device_stock import DeviceStock
 from planning.proofs.quotas import Quotas, RegionFloors
 from planning.proofs.selection import CandidateCover, Selection, select_fewest
 from planning.scene.bodies.clearance import candidates_with_clearance
-from planning.scene.camera_views import CandidateViews
 from planning.scene.draws import DRAWS
 from planning.scene.limits import pair_limits
-from planning.scene.measured import (
+from planning.scene.measuring.camera_views import CandidateViews
+from planning.scene.measuring.measured import (
     LitSamples,
     furthest_failure,
     lit_samples,

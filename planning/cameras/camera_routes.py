@@ -22,11 +22,11 @@ from planning.cameras.paper.paper_cameras import (
     cover_of,
     route_among,
 )
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.document.certificates import CamerasBy, RouteCounts
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.selection import fewest_count
-from planning.scene.camera_views import CandidateViews
+from planning.scene.measuring.camera_views import CandidateViews
 from planning.scene.scene import Scene
 from planning.scene.workspace.model_candidates import one_of_each
 

@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.document.certificates import CamerasBy, Certificate
 from planning.model.document.ring_records import AxisTaken
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.selection import Selection
 from planning.rings.axis_moves import move_ring_axes
-from planning.scene.camera_views import CandidateViews
+from planning.scene.measuring.camera_views import CandidateViews
 from planning.scene.scene import Scene
 
 from .camera_cover import CameraCover

@@ -7,12 +7,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.proofs.moved_poses import free_devices
 from planning.proofs.selection import CandidateCover
 from planning.scene.bodies.clearance import with_clearance
 from planning.scene.draws import DRAWS
-from planning.scene.measured import measured_by, taken
+from planning.scene.measuring.measured import measured_by, taken
 from planning.scene.scene import Scene
 from planning.scene.workspace.model_candidates import ModelCandidates, one_of_each
 

@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaincinv
 
-from planning.model.calibration_errors import PERFECT
-from planning.model.planned import PlannedProjector
+from planning.model.devices.calibration_errors import PERFECT
+from planning.model.devices.planned import PlannedProjector
 from planning.model.requirements import TriangulationLimits
-from planning.scene.camera_views import CameraView
 from planning.scene.limits.pair_quality import NOISE_TERMS
-from planning.scene.measured import LitSamples, Pair, pairs_of
+from planning.scene.measuring.camera_views import CameraView
+from planning.scene.measuring.measured import LitSamples, Pair, pairs_of
 
 _Array = NDArray[np.float64]
 _Index = NDArray[np.int64]

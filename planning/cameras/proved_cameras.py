@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from geometry.devices import PinholeModel
+from planning.model.devices.planned import PlannedCamera
 from planning.model.document.certificates import RouteCounts
-from planning.model.planned import PlannedCamera
 from planning.proofs.all_poses import BoundQuestion, Effort, joined, with_existing_alone
 from planning.proofs.camera_bound import bound_cameras
 from planning.proofs.candidate_certificate import PlannedStage, certified
 from planning.proofs.quotas import RegionFloors
-from planning.scene.measured import taken
+from planning.scene.measuring.measured import taken
 from planning.scene.scene import Scene
 
 from .camera_cover import CameraCover, candidate_cover

@@ -13,12 +13,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.proofs.device_stock import within_stock
 from planning.proofs.quotas import Quotas, RegionFloors
 from planning.scene.bodies.clearance import lacks_clearance, with_clearance
 from planning.scene.draws import DRAWS
-from planning.scene.measured import lit_samples
+from planning.scene.measuring.measured import lit_samples
 from planning.scene.placed_bodies import blocked_by, bodies_of, moves_bodies
 from planning.scene.scene import Scene
 from planning.scene.workspace.model_candidates import one_of_each

@@ -8,15 +8,15 @@ from numpy.typing import NDArray
 
 from planning.cameras.camera_cover import CameraCover, n_fixed
 from planning.cameras.proved_cameras import CameraStage
-from planning.model.calibration_errors import Survival
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.calibration_errors import Survival
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.proofs.candidate_certificate import counted
 from planning.proofs.device_stock import DeviceStock
 from planning.proofs.losses import PairDemand
 from planning.proofs.quotas import RegionFloors
 from planning.proofs.surviving_counts import SurvivingCount, larger_selections
 from planning.scene.draws import DRAWS
-from planning.scene.measured import lit_samples, measuring_pairs, pair_counts
+from planning.scene.measuring.measured import lit_samples, measuring_pairs, pair_counts
 from planning.scene.samples import Target, merged
 from planning.scene.scene import Scene
 from solvers.surviving.fewest_surviving import (

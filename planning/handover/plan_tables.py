@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from planning.model.plan import RigPlan
-from planning.report.summary.device_lines import standing
+from planning.report.summary.devices.device_lines import standing
 from planning.scene.placed_bodies import kind_of
 
 # A pandas.DataFrame, else a list of rows.

@@ -16,9 +16,9 @@ from planning.model.document.coverage_records import Coverage, RegionRecord
 from planning.model.document.plan_document import FORMAT, VERSION, PlanDocument
 from planning.model.document.survival_records import SurvivalRecord
 
+from .devices.planned import PlannedCamera, PlannedProjector
 from .errors import InputError, PlanFileError, PlanningError
 from .files import reading, write_together
-from .planned import PlannedCamera, PlannedProjector
 from .proofs import ProofFile
 from .requirements import Requirements
 from .surface import Surface

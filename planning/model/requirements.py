@@ -9,8 +9,8 @@ from dataclasses import asdict, dataclass, replace
 from math import pi
 from typing import Any, Literal
 
-from .bodies import Box, Existing, Mount, Triple
-from .calibration_errors import PERFECT, CalibrationErrors, Robust, Survival
+from .devices.bodies import Box, Existing, Mount, Triple
+from .devices.calibration_errors import PERFECT, CalibrationErrors, Robust, Survival
 from .light.drawn_edges import DrawnEdges
 from .light.light_budget import LightBudget
 

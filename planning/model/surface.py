@@ -19,7 +19,7 @@ from geometry.files.file_content import file_content
 from geometry.mesh.mesh import MeshError, TriangleMesh
 from geometry.mesh.topology import numbered
 
-from .bodies import Obstacle
+from .devices.bodies import Obstacle
 from .errors import PlanFileError
 from .files import reading
 

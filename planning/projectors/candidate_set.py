@@ -7,8 +7,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.devices.planned import PlannedProjector
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.planned import PlannedProjector
 from planning.proofs.device_stock import DeviceStock
 from planning.proofs.quotas import RegionFloors
 from planning.proofs.selection import CandidateCover

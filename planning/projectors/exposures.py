@@ -8,7 +8,7 @@ light, not on which camera looks. So exposures are planned before there are came
 from collections.abc import Sequence
 from dataclasses import replace
 
-from planning.model.planned import PlannedProjector
+from planning.model.devices.planned import PlannedProjector
 from planning.scene.codes.patterns import panel_light
 from planning.scene.draws import DRAWS
 from planning.scene.lighting import light_on, lit_stages

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.planned import PlannedProjector
+from planning.model.devices.planned import PlannedProjector
 from planning.proofs.quotas import Quotas, RegionFloors
 from planning.proofs.selection import Selection, select_fewest
 from planning.scene.draws import DRAWS

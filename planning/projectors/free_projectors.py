@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.planned import PlannedProjector
+from planning.model.devices.planned import PlannedProjector
 from planning.proofs.selection import CandidateCover
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT

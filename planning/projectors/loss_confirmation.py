@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from planning.model.planned import PlannedProjector
+from planning.model.devices.planned import PlannedProjector
 from planning.proofs.losses import light_survives
 from planning.proofs.quotas import Quotas, RegionFloors
 from planning.scene.draws import DRAWS

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from geometry.arrays import Array
 from geometry.devices import PinholeModel
 from geometry.poses import inverse
-from planning.model.planned import PlannedProjector
+from planning.model.devices.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits, Workspace
 from planning.scene.codes.patterns import pattern_of
 from planning.scene.samples import Target

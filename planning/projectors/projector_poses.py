@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.device_poses import moved_to
-from planning.model.planned import PlannedProjector
+from planning.model.devices.device_poses import moved_to
+from planning.model.devices.planned import PlannedProjector
 from planning.proofs.losses import light_kept, still_lit
 from planning.proofs.quotas import Quotas
 from planning.scene.bodies.clearance import lacks_clearance

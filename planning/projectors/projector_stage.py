@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-from planning.model.planned import PlannedProjector
+from planning.model.devices.planned import PlannedProjector
 from planning.proofs.candidate_certificate import PlannedStage, certified, unsought
 from planning.proofs.conflicts import Interference, resolve_conflicts
 from planning.proofs.selection import Selection

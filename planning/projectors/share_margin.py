@@ -20,7 +20,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.planned import PlannedProjector
+from planning.model.devices.planned import PlannedProjector
 from planning.proofs.device_stock import DeviceStock
 from planning.proofs.quotas import Quotas
 from planning.proofs.selection import cover_problem

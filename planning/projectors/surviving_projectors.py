@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.planned import PlannedProjector
+from planning.model.devices.planned import PlannedProjector
 from planning.projectors.candidate_set import CandidateSet, CandidateSource
 from planning.projectors.loss_confirmation import confirms_losses
 from planning.projectors.projector_stage import ProjectorStage

@@ -29,7 +29,7 @@ from planning.proofs.cells.image_cone import image_cone
 from planning.proofs.cells.measurable_cells import MeasurableCells
 from planning.proofs.cells.position_cells import PositionTree
 from planning.proofs.cells.seen_cells import SeenCells
-from planning.scene.measured import LitSamples
+from planning.scene.measuring.measured import LitSamples
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from solvers.cells.cell_bound import CellStatus

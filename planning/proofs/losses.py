@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.calibration_errors import Survival
-from planning.scene.measured import (
+from planning.model.devices.calibration_errors import Survival
+from planning.scene.measuring.measured import (
     measured_fold,
     without_camera,
     without_projector,

@@ -14,7 +14,7 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from solvers import solve_max_coverage
 
 from .quotas import Quotas, RegionFloors, missed_shares

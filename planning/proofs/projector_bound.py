@@ -17,7 +17,7 @@ from geometry.devices import ParallelModel
 from geometry.directions.cube_map import CubeMap, cube_map
 from geometry.directions.open_directions import DirectionLimits
 from geometry.directions.widened_maps import WidenedMaps
-from planning.model.planned import PlannedProjector
+from planning.model.devices.planned import PlannedProjector
 from planning.model.requirements import Workspace
 from planning.proofs.cells.direction_cells import (
     DirectionTree,

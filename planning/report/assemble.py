@@ -35,10 +35,10 @@ from planning.report.entries.violations import violations
 from planning.rings.written_rings import evenly_ringed
 from planning.scene.scene import Scene
 
-from .claims import Claims, make_claims, tau_m
+from .claims.claims import Claims, make_claims, tau_m
+from .claims.judged import Devices
+from .claims.marginal import marginal_records, of_numbers
 from .entries import device_entries as entries
-from .judged import Devices
-from .marginal import marginal_records, of_numbers
 from .partial_plan import PartialPlan
 
 

@@ -27,12 +27,12 @@ from planning.scene.scene import Scene
 
 from .advice.camera_relaxations import unmeasurable_by_cause
 from .advice.what_helps import cameras_reach_too_little
-from .claims import Claims, make_claims, tau_m
+from .claims.claims import Claims, make_claims, tau_m
+from .claims.judged import Devices
+from .claims.marginal import OfNumber, marginal_records
 from .entries import device_entries as entries
 from .entries.overlaps import overlap_records
 from .entries.survival_entries import survival_record
-from .judged import Devices
-from .marginal import OfNumber, marginal_records
 from .written_plan import written_devices, written_scene
 
 

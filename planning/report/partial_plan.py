@@ -8,11 +8,11 @@ from geometry.parallel import n_threads
 from geometry.regions.regions import DominantRegions
 from planning.cache.cache import NO_CACHE, Cache
 from planning.cameras.proved_cameras import CameraStage
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.document.certificates import CamerasBy
 from planning.model.document.family_records import AlignedBy, AlignmentRecord
 from planning.model.document.ring_records import AxisTaken, RingAxis
 from planning.model.document.station_records import Stationed
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.projectors.projector_stage import ProjectorStage
 from planning.proofs.surviving_counts import SurvivingCount
 from planning.rig.mounted import Mounted

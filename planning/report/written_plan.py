@@ -6,14 +6,14 @@ from typing import TypeVar
 
 import numpy as np
 
-from planning.model.device_poses import DECIMALS, moved_to
+from planning.model.devices.device_poses import DECIMALS, moved_to
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.document.input_records import ModelRecord
 from planning.model.plan import RigPlan
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.scene.placed_bodies import Obstruction
 from planning.scene.scene import Scene
 
-from .judged import Devices
+from .claims.judged import Devices
 
 _D = TypeVar("_D", PlannedProjector, PlannedCamera)
 

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from geometry.devices import DeviceModel
 from geometry.poses import turns_of
-from planning.model.bodies import BodyTable
+from planning.model.devices.bodies import BodyTable
 from planning.model.requirements import Workspace
 from planning.model.table_types import Axis, Name, Table, WrittenPose, read_pose
 from planning.scene.workspace.candidates import aimed_poses

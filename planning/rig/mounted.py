@@ -14,10 +14,10 @@ import numpy as np
 from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
-from planning.model.bodies import Existing
+from planning.model.devices.bodies import Existing
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.errors import InputError
 from planning.model.plan import RigPlan
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Requirements, Workspace
 from planning.model.surface import Surface
 from planning.model.table_types import fault_words

@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 from geometry.files.readers import UNITS, load_mesh
 from geometry.mesh.mesh import MeshError, TriangleMesh
 from geometry.shapes import primitives
-from planning.model.bodies import Box, Obstacle
+from planning.model.devices.bodies import Box, Obstacle
 from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.model.requirements import Workspace
 from planning.model.table_types import Axis, Name, Table

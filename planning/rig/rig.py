@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh.mesh import TriangleMesh
-from planning.model.bodies import Obstacle
+from planning.model.devices.bodies import Obstacle
 from planning.model.document.head_records import carried_records
 from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.model.requirements import Requirements, Workspace

@@ -8,7 +8,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.calibration_errors import AS_PLANNED, Survival
+from planning.model.devices.calibration_errors import AS_PLANNED, Survival
 from planning.model.errors import InfeasibleLimitsError, InputError
 from planning.model.light.drawn_edges import DrawnEdges
 from planning.model.light.light_budget import LightBudget

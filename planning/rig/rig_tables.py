@@ -9,8 +9,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from planning.model.bodies import BodyTable, MountTable
-from planning.model.calibration_errors import (
+from planning.model.devices.bodies import BodyTable, MountTable
+from planning.model.devices.calibration_errors import (
     MOST_FOCAL,
     PERFECT,
     CalibrationErrors,

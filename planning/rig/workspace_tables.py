@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 from scipy.spatial.transform import Rotation
 
-from planning.model.bodies import Axes, Box, Triple
+from planning.model.devices.bodies import Axes, Box, Triple
 from planning.model.table_types import Axis, Name, PositivePair, Sides, Table, UpName
 
 # Cosine above which two directions span no plane.

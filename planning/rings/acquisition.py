@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable, Sequence
 
-from planning.model.planned import PlannedCamera, PlannedProjector, code_bits
+from planning.model.devices.planned import PlannedCamera, PlannedProjector, code_bits
 
 # Quotients of rates that are whole but for rounding are whole.
 _ROUNDING = 1e-9

@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.poses import inverse, transform
-from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.scene.camera_views import view_of
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.scene.codes.patterns import inside_rings
 from planning.scene.draws import DRAWS
 from planning.scene.lights import light_of
 from planning.scene.limits.calibration_terms import calibration_px, surface_deviation
 from planning.scene.limits.camera_limits import ViewedSamples
-from planning.scene.measurability import expected_noise_px
-from planning.scene.measured import (
+from planning.scene.measuring.camera_views import view_of
+from planning.scene.measuring.measurability import expected_noise_px
+from planning.scene.measuring.measured import (
     LitSamples,
     least_sigma,
     lit_samples,

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.mesh.sampling import SurfaceSamples
-from planning.model.planned import PlannedProjector
+from planning.model.devices.planned import PlannedProjector
 from planning.scene import lighting
 from planning.scene.lights import light_of
 from planning.scene.limits import projector_limits

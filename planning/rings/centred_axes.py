@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from geometry.arrays import lengths
 from geometry.mesh.extent import enclosing_ball
 from geometry.poses import inverse, transform
-from planning.model.planned import PlannedProjector
+from planning.model.devices.planned import PlannedProjector
 from planning.scene.codes.patterns import RingPattern
 from planning.scene.draws import DRAWS
 from planning.scene.lighting import lit_stages

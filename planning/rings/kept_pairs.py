@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.proofs.losses import PairDemand
 from planning.proofs.quotas import RegionFloors
 from planning.scene.draws import DRAWS
-from planning.scene.measured import LitSamples, lit_samples, measuring_pairs
+from planning.scene.measuring.measured import LitSamples, lit_samples, measuring_pairs
 from planning.scene.scene import Scene
 
 from .ring_stage import RingStage, Spacing, space_rings

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from geometry.arrays import lengths
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.topology import face_pairs
-from planning.model.planned import PlannedProjector
+from planning.model.devices.planned import PlannedProjector
 from planning.scene.codes.patterns import RingPattern
 from planning.scene.lighting import first_failure, light_on
 from planning.scene.limits.projector_limits import LIT

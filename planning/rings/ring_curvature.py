@@ -16,7 +16,7 @@ light a plane has 1/z linear in R, so a chord is straight in 1/z::
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.planned import PlannedProjector
+from planning.model.devices.planned import PlannedProjector
 from planning.scene.lights import Light, light_of
 
 from .beam_profile import BeamProfile

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.planned import PlannedProjector
+from planning.model.devices.planned import PlannedProjector
 from planning.scene.codes.patterns import RingPattern
 from planning.scene.lights import light_of
 from planning.scene.scene import Scene

@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.poses import inverse
-from planning.model.planned import PlannedProjector
+from planning.model.devices.planned import PlannedProjector
 from planning.scene.codes.patterns import RingPattern
 from planning.scene.lighting import assigned_projectors, lit_margins
 from planning.scene.lights import light_of
 from planning.scene.limits.camera_limits import ViewedSamples
-from planning.scene.measured import LitSamples, lit_samples, pairs_of
+from planning.scene.measuring.measured import LitSamples, lit_samples, pairs_of
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 

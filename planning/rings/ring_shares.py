@@ -9,9 +9,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.document.ring_records import RingSharesRecord
-from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.scene.measured import LitSamples, measured_by
+from planning.scene.measuring.measured import LitSamples, measured_by
 from planning.scene.scene import Scene
 
 from .beam_profile import BeamProfile, cast_beam, on_faces

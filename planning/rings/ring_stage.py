@@ -15,15 +15,15 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.device_poses import DECIMALS
+from planning.model.devices.device_poses import DECIMALS
+from planning.model.devices.planned import PlannedCamera, PlannedProjector, code_bits
 from planning.model.document.ring_records import CreasesRecord, RingsRecord
-from planning.model.planned import PlannedCamera, PlannedProjector, code_bits
 from planning.model.requirements import Requirements
-from planning.scene.camera_views import view_of
 from planning.scene.codes.patterns import RingPattern
 from planning.scene.draws import DRAWS
 from planning.scene.limits.camera_limits import ViewedSamples
-from planning.scene.measured import LitSamples, lit_samples
+from planning.scene.measuring.camera_views import view_of
+from planning.scene.measuring.measured import LitSamples, lit_samples
 from planning.scene.samples import merged
 from planning.scene.scene import Scene
 

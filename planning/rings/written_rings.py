@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from planning.model.devices.planned import PlannedProjector
 from planning.model.document.ring_records import RingsRecord
-from planning.model.planned import PlannedProjector
 from planning.scene.scene import Scene
 
 from .ring_creases import find_creases

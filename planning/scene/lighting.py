@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from geometry.poses import inverse, transform
 from geometry.rays.rays import equal_parts
-from planning.model.planned import PlannedProjector
+from planning.model.devices.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 from planning.scene.limits.limit import first_violated
 from planning.scene.limits.projector_limits import (

@@ -25,9 +25,9 @@ from geometry.shapes.boxes import (
     lines_cross,
     triangles_touch,
 )
-from planning.model.bodies import Body, Existing, Obstacle
-from planning.model.device_poses import moved_to
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.bodies import Body, Existing, Obstacle
+from planning.model.devices.device_poses import moved_to
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Requirements
 
 Device = PlannedProjector | PlannedCamera

@@ -15,7 +15,7 @@ from geometry.rays.visibility import Visibility
 from geometry.repair.hollow import MeshShell, measure_shell
 from planning.cache.cache import NO_CACHE, Cache
 from planning.cache.content import content
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import (
     CameraLimits,
     CheckLimits,

@@ -15,9 +15,9 @@ from geometry.mesh.bearing import bearing
 from geometry.regions.regions import DominantRegions, dominant_regions
 from geometry.regions.selected_regions import regions_of_faces
 from planning.cameras.camera_cover import camera_candidate_views
-from planning.model.device_poses import moved_to
+from planning.model.devices.device_poses import moved_to
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.errors import InputError
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
 from planning.model.words import count_words
@@ -26,8 +26,8 @@ from planning.report.partial_plan import PlanRequest, Prepared
 from planning.rig.rig import Rig
 from planning.rings.ring_radii import uniform_radii, widest_ring_gap
 from planning.scene.bodies.clearance import check_existing_clearance
-from planning.scene.camera_views import CandidateViews
 from planning.scene.lights import light_of, ring_frame
+from planning.scene.measuring.camera_views import CandidateViews
 from planning.scene.placed_bodies import Obstruction, existing_devices
 from planning.scene.scene import Scene
 

@@ -6,7 +6,7 @@ cameras finds them done.
 
 from dataclasses import replace
 
-from planning.model.planned import PlannedProjector
+from planning.model.devices.planned import PlannedProjector
 from planning.projectors.exposures import with_exposures
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import ProjectorStage, plan_projectors

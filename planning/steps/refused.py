@@ -4,8 +4,8 @@ from planning.report.partial_plan import PlanRequest
 
 from .asked.family_request import check_family
 from .cameras_alone.refusals import check_alone
-from .carried import check_carried
 from .joint.joining import check_joint
+from .stations.carried import check_carried
 from .surviving import check_survival
 
 

@@ -26,8 +26,8 @@ from planning.report.advice.projector_relaxations import nothing_lit
 from planning.report.advice.standing_inside import standing_inside
 from planning.report.advice.what_helps import falls_short
 from planning.report.assemble import Claimed
+from planning.report.claims.region_claims import below_floor
 from planning.report.partial_plan import PartialPlan, Prepared
-from planning.report.region_claims import below_floor
 from planning.rings.acquisition import pixels_read
 from planning.rings.kept_pairs import rings_for_pairs
 

@@ -22,7 +22,7 @@ from planning.cameras.baselines.seams import (
     neighbouring_pairs,
     overlap_components,
 )
-from planning.model.planned import PlannedCamera
+from planning.model.devices.planned import PlannedCamera
 
 K = np.array([[800.0, 0.0, 319.5], [0.0, 800.0, 239.5], [0.0, 0.0, 1.0]])
 RESOLUTION = (640, 480)

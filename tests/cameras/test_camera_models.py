@@ -12,7 +12,7 @@ from geometry.shapes.primitives import sphere
 from planning.cameras.camera_cover import camera_candidate_views, candidate_cover
 from planning.cameras.camera_routes import better_route, cover_by_cover
 from planning.cameras.proved_cameras import camera_stage
-from planning.model.planned import PlannedProjector
+from planning.model.devices.planned import PlannedProjector
 from planning.model.requirements import Stock
 from planning.projectors.projector_stage import plan_projectors
 from planning.proofs.device_stock import within_stock

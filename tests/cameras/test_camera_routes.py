@@ -39,20 +39,20 @@ from planning.cameras.paper.paper_cameras import (
     route_among,
 )
 from planning.cameras.proved_cameras import camera_stage
-from planning.model.bodies import Body
+from planning.model.devices.bodies import Body
+from planning.model.devices.planned import PlannedProjector
 from planning.model.document.certificates import Certificate, RouteCounts
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.planned import PlannedProjector
 from planning.projectors.projector_stage import plan_projectors
 from planning.proofs.all_poses import Effort
 from planning.proofs.quotas import required_samples
-from planning.report.reach import measured_by_any
+from planning.report.claims.reach import measured_by_any
 from planning.report.summary.proof_lines import route_lines
 from planning.rig.rig import load_rig
 from planning.rings.ring_radii import uniform_radii
 from planning.scene.draws import DRAWS, Draw
 from planning.scene.lights import ring_frame
-from planning.scene.measured import lit_samples, measured_by
+from planning.scene.measuring.measured import lit_samples, measured_by
 from planning.verify.audit.audit import audit_plan
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.counts.route_claims import audit_routes

@@ -18,8 +18,8 @@ from planning.cameras.camera_cover import (
 )
 from planning.cameras.free_cameras import CameraOffer, has_room, one_camera_fewer
 from planning.cameras.proved_cameras import bound_stage, camera_stage
-from planning.model.bodies import Existing
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.bodies import Existing
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.proofs import camera_bound
 from planning.proofs.all_poses import Effort
 from planning.proofs.moved_poses import _Moves, free_devices
@@ -27,7 +27,7 @@ from planning.proofs.selection import CandidateCover
 from planning.rig.rig import Rig, load_rig
 from planning.scene.draws import DRAWS
 from planning.scene.lights import ring_frame
-from planning.scene.measured import lit_samples, measured_by
+from planning.scene.measuring.measured import lit_samples, measured_by
 from planning.scene.workspace.candidates import aimed_poses
 from planning.steps import stages
 from planning.verify.audit.audit import audit_plan

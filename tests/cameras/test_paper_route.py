@@ -17,7 +17,7 @@ from planning.cameras.baselines.widest_baselines import BaselineSearch
 from planning.cameras.paper import hole_closing
 from planning.cameras.paper.paper_route import paper_route
 from planning.cameras.paper.route_problem import CameraSet, RouteProblem
-from planning.model.planned import PlannedCamera
+from planning.model.devices.planned import PlannedCamera
 from planning.proofs.quotas import Quotas, RegionFloors
 
 THETA = np.radians(60.0)

@@ -20,9 +20,9 @@ from planning.cameras.photogrammetry.view_bound import bound_views
 from planning.cameras.photogrammetry.view_stage import candidate_pairs, place_views
 from planning.model.errors import InfeasibleLimitsError
 from planning.proofs import camera_bound
-from planning.scene.camera_views import CandidateViews
 from planning.scene.draws import DRAWS
 from planning.scene.limits.view_pair_limits import VIEW_CAUSES
+from planning.scene.measuring.camera_views import CandidateViews
 from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.predicates.audit_devices import AuditCamera
 from planning.verify.audit.predicates.occlusion import Shadow

@@ -10,14 +10,14 @@ from support.little_work import draw_fewer
 from planning.cameras import surer_cameras as searching
 from planning.cameras.pair_errors import PairErrors
 from planning.cameras.surer_cameras import Aim, surer_cameras
-from planning.model.calibration_errors import AS_PLANNED, CalibrationErrors
+from planning.model.devices.calibration_errors import AS_PLANNED, CalibrationErrors
 from planning.model.document.certificates import CountArea
 from planning.proofs.candidate_certificate import PlannedStage, counted
 from planning.report.tolerance.built_case import BuiltCase
 from planning.report.tolerance.drawn_rigs import deviations_of
 from planning.report.tolerance.tolerance import draw, question_of
-from planning.scene.camera_views import CandidateViews, camera_views
-from planning.scene.measured import lit_samples
+from planning.scene.measuring.camera_views import CandidateViews, camera_views
+from planning.scene.measuring.measured import lit_samples
 
 _OFF = CalibrationErrors(np.radians(0.02), 5e-5, 2e-4, 0.3)
 _SMALL = 1e-2

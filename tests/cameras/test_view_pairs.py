@@ -11,10 +11,10 @@ from support.view_rigs import camera_towards
 from geometry.devices import PinholeModel
 from geometry.mesh.sampling import SurfaceSamples
 from planning.cameras.photogrammetry.view_pairs import Sightings
-from planning.model.calibration_errors import CalibrationErrors
+from planning.model.devices.calibration_errors import CalibrationErrors
 from planning.model.requirements import CameraLimits, TriangulationLimits
-from planning.scene import measurability
-from planning.scene.camera_views import CameraView
+from planning.scene.measuring import measurability
+from planning.scene.measuring.camera_views import CameraView
 from planning.scene.samples import Target
 from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.predicates.audit_devices import AuditCamera

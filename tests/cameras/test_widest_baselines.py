@@ -20,13 +20,13 @@ from planning.cameras.baselines.baseline_terms import BaselineTerms
 from planning.cameras.baselines.camera_moves import Looks
 from planning.cameras.baselines.seams import SampledSurface
 from planning.cameras.baselines.widest_baselines import BaselineSearch
-from planning.model.bodies import Box
-from planning.model.planned import PlannedCamera
+from planning.model.devices.bodies import Box
+from planning.model.devices.planned import PlannedCamera
 from planning.model.requirements import TriangulationLimits
 from planning.scene.codes.surfaces import CodeSurfaces
 from planning.scene.limits.camera_limits import ViewedSamples
 from planning.scene.limits.pair_limits import MEASURED
-from planning.scene.measurability import first_pair_failure, pair_quality
+from planning.scene.measuring.measurability import first_pair_failure, pair_quality
 
 THETA = np.radians(60.0)
 RADIUS, RING = 0.1, 1.0

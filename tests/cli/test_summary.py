@@ -10,11 +10,11 @@ from support.plain_shapes import joined
 from geometry.devices import PinholeModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
+from planning.model.devices.planned import PlannedCamera
 from planning.model.plan import RigPlan
-from planning.model.planned import PlannedCamera
 from planning.model.progress import Stopwatch
 from planning.report.summary.coverage_lines import coverage_lines
-from planning.report.summary.device_lines import aim_angles
+from planning.report.summary.devices.device_lines import aim_angles
 from planning.report.summary.summary import body_words, summary
 from planning.scene.workspace.candidates import aimed_poses
 

@@ -16,7 +16,7 @@ from planning.projectors.candidate_set import CandidateSource
 from planning.report.entries.device_entries import rounded_camera, rounded_projector
 from planning.rig.wishes import Wishes
 from planning.scene.draws import DRAWS
-from planning.scene.measured import lit_samples, measured_by
+from planning.scene.measuring.measured import lit_samples, measured_by
 from planning.steps.asked.request import request_of
 from planning.steps.front import front_matrix
 from planning.steps.front import plan_front as fronts

@@ -7,10 +7,10 @@ import pytest
 from support.group_rigs import head_rig, planned
 
 from geometry.shapes.boxes import box_gap
+from planning.model.devices.planned import meet
 from planning.model.errors import InputError, PlanFileError
-from planning.model.planned import meet
 from planning.report.page.per_face import centroids, per_face
-from planning.report.summary.station_lines import fewest_words
+from planning.report.summary.devices.station_lines import fewest_words
 from planning.rig.rig import Rig
 from planning.scene.draws import DRAWS
 from planning.scene.placed_bodies import placed_box

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from geometry.shapes.boxes import lines_cross
 from planning.cameras.stations.heads.housings import in_the_way
-from planning.model.bodies import Body
+from planning.model.devices.bodies import Body
 from planning.scene.placed_bodies import placed_box
 
 _BALL = np.array([0.02, -0.01, 0.03]), 0.1

@@ -22,9 +22,9 @@ from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import look_at
 from planning.cameras.baselines.baseline_rows import baseline_rows
 from planning.cameras.baselines.seams import SampledSurface
-from planning.model.planned import PlannedCamera
+from planning.model.devices.planned import PlannedCamera
 from planning.model.requirements import CameraLimits
-from planning.scene.measurability import view
+from planning.scene.measuring.measurability import view
 from planning.scene.samples import Target
 from solvers import CoverProblem, solve_cover
 

@@ -22,7 +22,7 @@ from planning.report.assemble import Draft, write_plan
 from planning.rig.rig import load_rig
 from planning.scene.codes.patterns import RingPattern
 from planning.scene.draws import Draw
-from planning.scene.measured import lit_samples, measured_by
+from planning.scene.measuring.measured import lit_samples, measured_by
 from planning.verify.audit.audit import audit_plan
 
 RIG = """

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 from support.factories import make_projector, make_rig
 
-from planning.model.device_poses import moved_to
+from planning.model.devices.device_poses import moved_to
 from planning.report.entries.device_entries import rounded_projector
 
 

@@ -8,7 +8,7 @@ from support.factories import make_requirements, make_scene
 
 from geometry.devices import PinholeModel
 from geometry.shapes.primitives import sphere
-from planning.model.planned import PlannedProjector
+from planning.model.devices.planned import PlannedProjector
 from planning.model.requirements import Stock
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import plan_projectors

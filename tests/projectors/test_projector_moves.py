@@ -9,7 +9,7 @@ from support.plain_shapes import box
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import sphere
-from planning.model.planned import PlannedProjector
+from planning.model.devices.planned import PlannedProjector
 from planning.projectors.candidate_set import CandidateSet
 from planning.projectors.projector_poses import _between, widen_margins
 from planning.projectors.projector_stage import ProjectorStage, plan_projectors

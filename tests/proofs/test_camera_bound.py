@@ -14,8 +14,9 @@ from geometry.poses import look_at
 from geometry.shapes.primitives import sphere
 from planning.cameras.camera_cover import camera_candidate_views, plan_cameras
 from planning.cameras.proved_cameras import bound_stage, camera_stage
-from planning.model.bodies import Existing
-from planning.model.calibration_errors import CalibrationErrors
+from planning.model.devices.bodies import Existing
+from planning.model.devices.calibration_errors import CalibrationErrors
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.document.certificates import (
     BestArea,
     CandidateBound,
@@ -25,7 +26,6 @@ from planning.model.document.certificates import (
     NeededCount,
     OneFewer,
 )
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs import all_poses, camera_bound
 from planning.proofs.camera_bound import DEFAULT, PROVE, bound_cameras, camera_trees
 from planning.proofs.cells import crossings
@@ -36,7 +36,7 @@ from planning.scene.codes.surfaces import CodeSurfaces
 from planning.scene.draws import Draw
 from planning.scene.lights import ring_frame
 from planning.scene.limits import pair_limits
-from planning.scene.measured import LitSamples, lit_samples
+from planning.scene.measuring.measured import LitSamples, lit_samples
 from planning.scene.samples import LightOnSamples
 from planning.scene.workspace.candidates import aimed_poses
 from solvers.cells.cell_bound import CellStatus
@@ -377,7 +377,7 @@ def _facing(towards, samples):
 
 def _exact(rows, position, device, required):
     """What a camera that looks at the centre measures, but for shadows."""
-    from planning.scene import measurability
+    from planning.scene.measuring import measurability
 
     camera = PlannedCamera("", look_at(position, np.zeros(3), UP), device)
     seen = measurability.view(camera, rows.target, required.camera, None)

@@ -11,7 +11,7 @@ from support.plain_shapes import box, cylinder, grid, joined, torus
 from geometry.directions.cube_map import CubeMap
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import sphere
-from planning.model.bodies import Box
+from planning.model.devices.bodies import Box
 from planning.proofs import projector_bound as continuous
 from planning.proofs.all_poses import BoundQuestion, Effort
 from planning.proofs.cells.direction_cells import DirectionTree

@@ -7,14 +7,14 @@ import pytest
 from proofs.test_camera_bound import FREE, LENSES, _rotations, _turned_by, scene_of
 
 from geometry.shapes.primitives import sphere
-from planning.model.calibration_errors import CalibrationErrors
+from planning.model.devices.calibration_errors import CalibrationErrors
 from planning.model.light.dense_code import DenseCode
 from planning.proofs.cells.measurable_cells import MeasurableCells
 from planning.scene.codes.surfaces import CodedPixels, PanelLight, PanelRays
 from planning.scene.draws import Draw
 from planning.scene.limits.camera_limits import SEEN, ViewedSamples
-from planning.scene.measurability import pair_quality
-from planning.scene.measured import LitSamples
+from planning.scene.measuring.measurability import pair_quality
+from planning.scene.measuring.measured import LitSamples
 from planning.scene.samples import LightOnSamples
 
 N, TRIES = 200, 100

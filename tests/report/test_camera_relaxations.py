@@ -15,8 +15,8 @@ from geometry.poses import look_at
 from geometry.shapes.primitives import sphere
 from planning.cameras.camera_cover import CameraCover
 from planning.cameras.proved_cameras import CameraStage
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.plan import RigPlan
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.report.advice import camera_relaxations
 from planning.report.advice.camera_relaxations import (
     SPARE,
@@ -27,17 +27,17 @@ from planning.report.advice.camera_relaxations import (
 from planning.report.advice.demands import Demands, demands
 from planning.report.advice.least_changes import Share, least_changes, least_enough
 from planning.report.advice.least_changes import relaxations_of_cameras as ways
-from planning.report.claims import make_claims
-from planning.report.judged import Devices
+from planning.report.claims.claims import make_claims
+from planning.report.claims.judged import Devices
 from planning.report.summary.shortfall import shortfalls
 from planning.rig import optics
 from planning.rig.rig import load_rig
 from planning.rig.wishes import Wishes
-from planning.scene.camera_views import CandidateViews
 from planning.scene.draws import Draw
 from planning.scene.lights import ring_frame
 from planning.scene.limits.pair_limits import CAUSES, MEASURED
-from planning.scene.measured import furthest_failure, lit_samples, measured_by
+from planning.scene.measuring.camera_views import CandidateViews
+from planning.scene.measuring.measured import furthest_failure, lit_samples, measured_by
 from planning.scene.workspace.candidates import aimed_poses
 from planning.verify.audit.audit import audit_plan
 

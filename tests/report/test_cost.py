@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from geometry.devices import PinholeModel
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.document.device_records import (
     ProjectorRecord,
     camera_record,
@@ -11,7 +12,6 @@ from planning.model.document.device_records import (
 )
 from planning.model.document.input_records import RigRecord
 from planning.model.document.ring_records import CreasesRecord, RingsRecord
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.report.entries.cost_entry import cost_record
 from planning.report.summary.check_lines import cost_lines
 from planning.rings.acquisition import frame_time, n_frames, pixels_read

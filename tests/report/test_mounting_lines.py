@@ -11,9 +11,9 @@ from geometry.devices import PinholeModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import box
 from planning.cli.main import commands
-from planning.model.bodies import Obstacle
-from planning.report.summary.device_lines import device_lines
-from planning.report.summary.zone_lines import zone_lines
+from planning.model.devices.bodies import Obstacle
+from planning.report.summary.devices.device_lines import device_lines
+from planning.report.summary.devices.zone_lines import zone_lines
 from planning.verify.audit.devices.camera_figures import camera_figures
 
 CENTRE = np.array([0.3, -0.02, 0.5])

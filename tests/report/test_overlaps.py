@@ -10,8 +10,8 @@ from support.plain_shapes import box, grid, joined
 from geometry.devices import ParallelModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import sphere
+from planning.model.devices.planned import PlannedProjector
 from planning.model.plan import RigPlan
-from planning.model.planned import PlannedProjector
 from planning.report.entries.overlaps import overlap_records, shared_areas
 from planning.report.summary.coverage_lines import schedule_lines
 from planning.rig.rig import load_rig

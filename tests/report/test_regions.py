@@ -31,11 +31,11 @@ from planning.report.advice.floor_relaxations import (
     with_floor_relaxations,
     with_small_floor,
 )
-from planning.report.claims import make_claims
+from planning.report.claims.claims import make_claims
+from planning.report.claims.judged import Devices
 from planning.report.drawing.panel import Panel
 from planning.report.drawing.picture_view import fitted
 from planning.report.drawing.region_numbers import direction_of_unseen, region_spots
-from planning.report.judged import Devices
 from planning.report.summary.region_lines import (
     region_lines,
     region_table,

@@ -9,8 +9,8 @@ from support.factories import make_requirements, make_scene
 from support.plain_shapes import grid
 
 from geometry.shapes.primitives import sphere
+from planning.model.devices.planned import PlannedProjector
 from planning.model.plan import RigPlan
-from planning.model.planned import PlannedProjector
 from planning.projectors.projector_stage import plan_projectors
 from planning.report.summary.shortfall import shortfalls
 from planning.rig.rig import load_rig

@@ -5,7 +5,7 @@ import pytest
 from support.factories import make_requirements, make_rig, make_scene
 
 from geometry.shapes.primitives import sphere
-from planning.model.planned import PlannedCamera
+from planning.model.devices.planned import PlannedCamera
 from planning.report.advice.standing_inside import standing_inside
 
 PLACES = [[0.0, 0, 0], [0.29, 0, 0], [0, -0.2, 0.1], [0.31, 0, 0], [0, 0, 1.3]]

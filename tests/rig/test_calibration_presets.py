@@ -5,7 +5,7 @@ import math
 import pytest
 
 from planning import load_rig
-from planning.model.calibration_errors import CalibrationErrors
+from planning.model.devices.calibration_errors import CalibrationErrors
 from planning.model.errors import RigError
 from planning.rig.toml.preset_lists import list_calibrations
 

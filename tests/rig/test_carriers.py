@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 from support.head_rigs import RIG
 
 from planning import load_rig
+from planning.model.devices.heads import Stations, Turntable
 from planning.model.document.input_records import RigRecord
 from planning.model.errors import RigError
-from planning.model.heads import Stations, Turntable
 
 TABLE = {"point_mm": [10.0, 20.0, 0.0], "axis": [0.0, 0.0, 2.0]}
 BOX = {

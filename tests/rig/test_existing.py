@@ -12,18 +12,18 @@ from support.written import requirements_of
 
 from geometry.shapes.primitives import sphere
 from planning import load_rig, plan_rig
-from planning.model.bodies import Existing
+from planning.model.devices.bodies import Existing
+from planning.model.devices.planned import PlannedCamera
 from planning.model.errors import InfeasibleLimitsError, PlanFileError, RigError
 from planning.model.plan import RequirementError, RigPlan
-from planning.model.planned import PlannedCamera
 from planning.projectors.projector_poses import widen_margins
 from planning.projectors.projector_stage import plan_projectors
 from planning.projectors.proved_projectors import prove_fewest
 from planning.proofs.all_poses import Effort
 from planning.proofs.marginals import marginals
 from planning.proofs.selection import CandidateCover, select_fewest
-from planning.report.claims import make_claims
-from planning.report.judged import Devices
+from planning.report.claims.claims import make_claims
+from planning.report.claims.judged import Devices
 from planning.report.summary.summary import summary
 from planning.rig.wishes import Wishes
 from planning.verify.audit.audit import audit_plan

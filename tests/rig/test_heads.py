@@ -8,10 +8,10 @@ import pytest
 from support.head_rigs import HEAD, LENS, RIG, SHARP
 
 from planning import load_rig
-from planning.model.bodies import Body
+from planning.model.devices.bodies import Body
+from planning.model.devices.heads import Head, HeadDevice, MeasuringVolume
 from planning.model.document.input_records import RigRecord
 from planning.model.errors import RigError
-from planning.model.heads import Head, HeadDevice, MeasuringVolume
 from planning.rig.devices.rig_heads import seen_share, sees
 from planning.rig.tables.head_tables import check_housing
 

@@ -11,7 +11,7 @@ from support.written import requirements_of
 
 from geometry.poses import pan_tilt_roll
 from planning import load_rig, read_mounted
-from planning.model.bodies import Body
+from planning.model.devices.bodies import Body
 from planning.model.errors import InputError
 from planning.rig.mounted import split_fixed
 from planning.rig.wishes import Wishes

@@ -35,11 +35,11 @@ from planning.rings.axis_moves import (
 )
 from planning.rings.centred_axes import centred_axes
 from planning.rings.ring_radii import uniform_radii
-from planning.scene import measurability
 from planning.scene.codes.patterns import pattern_of
 from planning.scene.draws import Draw
 from planning.scene.lights import light_of, ring_frame
-from planning.scene.measured import lit_samples, measured_by
+from planning.scene.measuring import measurability
+from planning.scene.measuring.measured import lit_samples, measured_by
 from planning.scene.workspace.candidates import Candidates
 from solvers.poses.axis_program import axis_scores, axis_slack, pair_scores
 

@@ -9,8 +9,8 @@ from planning.cameras.camera_cover import camera_candidate_views, plan_cameras
 from planning.cameras.proved_cameras import camera_stage
 from planning.projectors.projector_stage import plan_projectors
 from planning.report.advice.projector_relaxations import reachability_relaxations
-from planning.report.claims import make_claims
-from planning.report.judged import Devices
+from planning.report.claims.claims import make_claims
+from planning.report.claims.judged import Devices
 from planning.rig.rig import load_rig
 from planning.rings.ring_pitch import widest_gap
 from planning.rings.ring_radii import uniform_radii

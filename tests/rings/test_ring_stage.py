@@ -11,7 +11,7 @@ from geometry.devices import PinholeModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
 from geometry.shapes.primitives import sphere
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.rig.rig import load_rig
 from planning.rig.wishes import Wishes
 from planning.rings import ring_pitch
@@ -24,13 +24,13 @@ from planning.rings.ring_pitch import best_pitch, projector_gaps, widest_gap
 from planning.rings.ring_radii import uniform_radii
 from planning.rings.ring_shares import ring_shares
 from planning.rings.ring_stage import space_rings
-from planning.scene import measurability
 from planning.scene.codes.patterns import pattern_of
 from planning.scene.draws import DRAWS, Draw
 from planning.scene.lighting import lit_stages
 from planning.scene.lights import ring_frame
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.measured import lit_samples, measured_by
+from planning.scene.measuring import measurability
+from planning.scene.measuring.measured import lit_samples, measured_by
 
 RADIUS = 0.1
 AWAY = 1.1

@@ -24,9 +24,9 @@ from planning import load_rig
 from planning.cameras.camera_baselines import BaselineSamples
 from planning.cameras.camera_bodies import CameraInterference, resolved_cover
 from planning.cameras.camera_cover import CameraCover
-from planning.model.bodies import Body, Box, Existing
+from planning.model.devices.bodies import Body, Box, Existing
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError, RigError
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.projectors.projector_poses import _Lit
 from planning.proofs.conflicts import (
     Interference,
@@ -37,17 +37,18 @@ from planning.proofs.marginals import marginals
 from planning.proofs.selection import CandidateCover, select_fewest
 from planning.report.drawing.figures import device_figures
 from planning.rig.wishes import Wishes
-from planning.scene import lighting, measurability
+from planning.scene import lighting
 from planning.scene.bodies.clearance import (
     candidates_with_clearance,
     check_existing_clearance,
     lacks_clearance,
 )
-from planning.scene.camera_views import camera_views
 from planning.scene.draws import Draw
 from planning.scene.lighting import lit_stages
 from planning.scene.limits import camera_limits, projector_limits
-from planning.scene.measured import lit_samples, measured_by
+from planning.scene.measuring import measurability
+from planning.scene.measuring.camera_views import camera_views
+from planning.scene.measuring.measured import lit_samples, measured_by
 from planning.scene.placed_bodies import bodies_of
 from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.predicates.audit_devices import AuditCamera, AuditProjector

@@ -8,11 +8,12 @@ from scene.test_measurability import CAMERA, SETUPS, UP, one_sample, projector
 from support.simulated_rigs import ONE_EACH, off_by, scales, triangulated
 
 from geometry.poses import look_at
-from planning.model.calibration_errors import PERFECT, CalibrationErrors
-from planning.model.planned import PlannedCamera
+from planning.model.devices.calibration_errors import PERFECT, CalibrationErrors
+from planning.model.devices.planned import PlannedCamera
 from planning.model.requirements import CameraLimits, TriangulationLimits
-from planning.scene import lighting, measurability
+from planning.scene import lighting
 from planning.scene.codes.patterns import pattern_of
+from planning.scene.measuring import measurability
 from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.predicates.audit_devices import AuditCamera, AuditProjector
 from planning.verify.audit.predicates.error_terms import PairGeometry, error_terms

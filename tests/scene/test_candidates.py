@@ -5,7 +5,7 @@ import pytest
 
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import inverse, transform
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import TriangulationLimits, Workspace
 from planning.rings.ring_radii import ring_gap, uniform_radii
 from planning.scene.lights import light_of, ring_frame

@@ -8,16 +8,17 @@ from scene.test_measurability import CAMERA, SETUPS, UP, one_sample, projector
 
 from geometry.devices import ParallelModel
 from geometry.poses import look_at
-from planning.model.calibration_errors import CalibrationErrors
+from planning.model.devices.calibration_errors import CalibrationErrors
+from planning.model.devices.planned import PlannedCamera
 from planning.model.light.dense_code import DenseCode
 from planning.model.light.drawn_edges import DrawnEdges
 from planning.model.light.light_budget import LightBudget
-from planning.model.planned import PlannedCamera
 from planning.model.requirements import CameraLimits, TriangulationLimits
 from planning.report.tolerance.retriangulation import retriangulated
-from planning.scene import lighting, measurability
+from planning.scene import lighting
 from planning.scene.codes.patterns import pattern_of
 from planning.scene.limits import pair_limits
+from planning.scene.measuring import measurability
 from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.predicates.audit_devices import AuditCamera, AuditProjector
 from planning.verify.audit.predicates.error_terms import PairGeometry, error_terms

@@ -15,10 +15,10 @@ from scene.test_measurability import (
 )
 
 from geometry.poses import look_at
+from planning.model.devices.planned import PlannedCamera
 from planning.model.light.drawn_edges import DrawnEdges
-from planning.model.planned import PlannedCamera
-from planning.scene import measurability
 from planning.scene.limits.edge_terms import edge_linearity_m
+from planning.scene.measuring import measurability
 from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.predicates.audit_devices import AuditCamera, AuditProjector
 from planning.verify.audit.predicates.error_terms import PairGeometry, error_terms

@@ -11,9 +11,8 @@ from scipy.special import ndtr
 
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import look_at
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.light.light_budget import SATURATED, LightBudget
-from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.scene import measurability
 from planning.scene.codes.patterns import panel_light
 from planning.scene.limits.light_terms import (
     edge_noise_px,
@@ -22,6 +21,7 @@ from planning.scene.limits.light_terms import (
 )
 from planning.scene.limits.limit import RigFacts
 from planning.scene.limits.pair_limits import CAUSES, Clipped, TooDark
+from planning.scene.measuring import measurability
 from planning.verify.audit.predicates.audit_devices import AuditCamera, AuditProjector
 from planning.verify.audit.predicates.light_levels import LightLevels
 

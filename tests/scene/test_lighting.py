@@ -12,7 +12,7 @@ from geometry.mesh.sampling import sample_surface
 from geometry.poses import look_at
 from geometry.rays.visibility import Visibility
 from geometry.shapes.primitives import sphere
-from planning.model.planned import PlannedProjector
+from planning.model.devices.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 from planning.scene import lighting
 from planning.scene.limits.projector_limits import CAUSES, LIT

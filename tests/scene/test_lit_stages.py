@@ -11,9 +11,9 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import transform
 from geometry.shapes.primitives import sphere
-from planning.model.planned import PlannedProjector
+from planning.model.devices.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
-from planning.report import reach
+from planning.report.claims import reach
 from planning.rig.rig import load_rig
 from planning.rings.ring_radii import uniform_radii
 from planning.scene import lighting

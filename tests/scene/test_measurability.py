@@ -7,11 +7,12 @@ from scipy.optimize import brentq
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.poses import inverse, look_at, transform
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import CameraLimits, TriangulationLimits
-from planning.scene import lighting, measurability
+from planning.scene import lighting
 from planning.scene.codes.patterns import pattern_of
 from planning.scene.limits import camera_limits, pair_limits
+from planning.scene.measuring import measurability
 from planning.scene.samples import Target
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -16,12 +16,12 @@ from support.plain_shapes import box as plate_of
 
 from geometry.mesh.mesh import TriangleMesh
 from planning import RequirementError, load_rig, plan_rig
-from planning.model.bodies import Mount
+from planning.model.devices.bodies import Mount
 from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.model.plan import RigPlan
 from planning.report.advice.least_changes import ANY_SETTING, larger_workspaces
 from planning.report.advice.projector_relaxations import reachability_relaxations
-from planning.report.reach import furthest_lit
+from planning.report.claims.reach import furthest_lit
 from planning.report.summary.coverage_lines import coverage_lines
 from planning.report.summary.summary import summary
 from planning.scene.draws import DRAWS

@@ -15,7 +15,7 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes import primitives
 from geometry.shapes.clipping import clipped_to_ball
 from planning import RequirementError, load_rig, plan_rig
-from planning.model.bodies import Obstacle
+from planning.model.devices.bodies import Obstacle
 from planning.model.errors import InfeasibleLimitsError, PlanFileError, RigError
 from planning.model.plan import RigPlan
 from planning.model.surface import Surface

@@ -12,9 +12,9 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import inverse, transform
 from geometry.shapes.primitives import sphere
 from planning.cameras.camera_cover import camera_candidate_views
-from planning.model.bodies import Box
-from planning.model.device_poses import moved_to
-from planning.model.planned import PlannedCamera
+from planning.model.devices.bodies import Box
+from planning.model.devices.device_poses import moved_to
+from planning.model.devices.planned import PlannedCamera
 from planning.model.progress import Stopwatch
 from planning.projectors.candidate_set import CandidateSet, CandidateSource
 from planning.projectors.one_fewer import one_fewer

@@ -10,9 +10,9 @@ from support.written import requirements_of
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import fibonacci_cap
 from planning import load_rig, plan_rig
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.model.plan import RequirementError, RigPlan
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.rig.wishes import Wishes
 from planning.scene.workspace.admissible import (
     admissible,

@@ -7,7 +7,7 @@ import numpy as np
 
 from geometry.mesh.mesh import TriangleMesh
 from planning import Rig, load_rig
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Requirements, Workspace
 from planning.rig.wishes import Wishes
 from planning.scene.lights import ring_frame

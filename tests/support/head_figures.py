@@ -6,14 +6,14 @@ import numpy as np
 
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.mesh.sampling import SurfaceSamples
-from planning.model.heads import Head, HeadDevice
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.heads import Head, HeadDevice
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.rig.devices.rig_heads import seen_share
 from planning.rig.rig import Rig
 from planning.rig.wishes import Wishes
 from planning.scene.codes.patterns import pattern_of
 from planning.scene.lighting import light_on
-from planning.scene.measurability import pair_quality, view
+from planning.scene.measuring.measurability import pair_quality, view
 from planning.scene.samples import Target
 
 # Presets with a head, by maker.

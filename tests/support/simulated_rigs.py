@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from geometry.devices import ParallelModel
 from geometry.poses import inverse, transform
-from planning.model.calibration_errors import CalibrationErrors
+from planning.model.devices.calibration_errors import CalibrationErrors
 
 # Turn about the device's axes, displacement along them, focal length, principal point.
 ONE_EACH = np.eye(9)

@@ -7,7 +7,7 @@ import numpy as np
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
-from planning.model.planned import PlannedCamera
+from planning.model.devices.planned import PlannedCamera
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from planning.verify.reconstruction.calibration import CameraCalibration

@@ -8,8 +8,8 @@ from support.group_rigs import egg, planned, table_rig
 
 from geometry.shapes.boxes import OrientedBox
 from planning.cameras.stations.turntable.table_sweep import TableSweep
+from planning.model.devices.heads import Turntable
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.heads import Turntable
 
 # The egg is 100 x 120 x 160 mm: about x, 80 mm reach far, and about z 60.
 _ABOUT_X = {"axis": [1.0, 0.0, 0.0]}
@@ -32,7 +32,7 @@ def swept(with_little_work, monkeypatch):
     def end(*_):
         raise Clear
 
-    module = "planning.steps.turntable.TableSets.of"
+    module = "planning.steps.stations.turntable.TableSets.of"
     monkeypatch.setattr(module, end)
     with with_little_work():
         yield Clear

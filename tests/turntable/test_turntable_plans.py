@@ -16,7 +16,7 @@ from planning.cameras.stations.turntable.table_sets import TableSets
 from planning.handover.export.export_frames import frame_of
 from planning.handover.export.exported_rig import ExportedRig
 from planning.handover.export.sheets.landmarks import Landmarks
-from planning.model.device_poses import moved_to
+from planning.model.devices.device_poses import moved_to
 from planning.model.errors import (
     InfeasibleLimitsError,
     InputError,

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.arrays import lengths
-from planning.model.calibration_errors import PERFECT, CalibrationErrors
-from planning.model.planned import PlannedCamera
+from planning.model.devices.calibration_errors import PERFECT, CalibrationErrors
+from planning.model.devices.planned import PlannedCamera
 from planning.model.requirements import Workspace
 from planning.scene.limits.calibration_terms import calibration_px
 

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
+from planning.model.devices.planned import PlannedCamera, meet
 from planning.model.document.device_records import BaselineRow
-from planning.model.planned import PlannedCamera, meet
 
 from .coverage_triangle import SeamAngles, baseline_parts, largest_baseline, seam_angles
 from .seams import SampledSurface, Seam, both_orders, find_seams, neighbouring_pairs

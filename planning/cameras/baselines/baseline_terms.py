@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from geometry.arrays import lengths
 from geometry.devices import PinholeModel
-from planning.model.planned import PlannedCamera
+from planning.model.devices.planned import PlannedCamera
 from planning.model.requirements import Workspace
 from planning.scene.workspace.admissible import half_spaces
 from solvers.poses.baseline_problem import (

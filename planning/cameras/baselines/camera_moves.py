@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.poses import look_at
-from planning.model.device_poses import moved_to
-from planning.model.planned import PlannedCamera
+from planning.model.devices.device_poses import moved_to
+from planning.model.devices.planned import PlannedCamera
 from planning.model.requirements import Workspace
 from planning.scene.workspace.admissible import admissible
 from planning.scene.workspace.mount_settings import settable

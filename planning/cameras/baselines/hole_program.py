@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.arrays import lengths
-from planning.model.planned import PlannedCamera
+from planning.model.devices.planned import PlannedCamera
 from solvers.poses.baseline_problem import BaselineProblem
 
 from .baseline_limits import BaselineLimits, RingsOnSurface, best_rings

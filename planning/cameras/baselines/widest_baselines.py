@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.planned import PlannedCamera
+from planning.model.devices.planned import PlannedCamera
 from solvers.poses.baseline_problem import smallest_baseline
 
 from .baseline_limits import BaselineLimits, RingsOnSurface

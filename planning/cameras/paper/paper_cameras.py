@@ -24,14 +24,14 @@ from planning.cameras.camera_cover import (
     measured_samples,
     n_fixed,
 )
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.all_poses import BoundQuestion
 from planning.proofs.camera_bound import rough_bound
 from planning.proofs.selection import CandidateCover, Selection
-from planning.scene.camera_views import CandidateViews
 from planning.scene.draws import DRAWS
-from planning.scene.measured import LitSamples, measured_by, taken
+from planning.scene.measuring.camera_views import CandidateViews
+from planning.scene.measuring.measured import LitSamples, measured_by, taken
 from planning.scene.scene import Scene
 from solvers import solve_cover
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from planning.cameras.baselines.baseline_limits import BaselineLimits, RingsOnSurface
 from planning.cameras.baselines.seams import SampledSurface
 from planning.cameras.baselines.widest_baselines import WidestBaselines
-from planning.model.planned import PlannedCamera
+from planning.model.devices.planned import PlannedCamera
 from planning.proofs.quotas import Quotas
 
 _Measured = NDArray[np.bool_]

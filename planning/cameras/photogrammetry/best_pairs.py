@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.planned import PlannedCamera
-from planning.scene.camera_views import camera_views
+from planning.model.devices.planned import PlannedCamera
+from planning.scene.measuring.camera_views import camera_views
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 

@@ -7,15 +7,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.planned import PlannedCamera
+from planning.model.devices.planned import PlannedCamera
 from planning.model.requirements import Requirements
-from planning.scene.camera_views import CameraView, camera_views, view_of
 from planning.scene.limits.limit import first_violated
 from planning.scene.limits.view_pair_limits import (
     FEW_VIEWS,
     MEASURED_BY_VIEWS,
     VIEW_PAIR_LIMITS,
 )
+from planning.scene.measuring.camera_views import CameraView, camera_views, view_of
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 

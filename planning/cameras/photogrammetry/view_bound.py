@@ -19,7 +19,7 @@ from geometry.devices import PinholeModel
 from planning.proofs.all_poses import BoundQuestion, Effort, joined
 from planning.proofs.camera_bound import bound_cameras
 from planning.proofs.quotas import RegionFloors
-from planning.scene.measured import LitSamples
+from planning.scene.measuring.measured import LitSamples
 from planning.scene.scene import Scene
 
 from .measured_views import views_of

@@ -26,11 +26,11 @@ from numpy.typing import NDArray
 
 from geometry.arrays import rows_of
 from planning.model.requirements import TriangulationLimits
-from planning.scene.camera_views import CameraView
 from planning.scene.limits.calibration_terms import ray_deviation
 from planning.scene.limits.camera_limits import ViewedSamples
 from planning.scene.limits.limit import Array, first_violated
 from planning.scene.limits.view_pair_limits import VIEW_PAIR_LIMITS
+from planning.scene.measuring.camera_views import CameraView
 
 ViewTerm = Literal["matches", "camera"]
 # Rays that meet at less are parallel: their intersection is anywhere.

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from planning.proofs.quotas import Quotas
 from planning.proofs.selection import CandidateCover, Selection
-from planning.scene.camera_views import CameraView
+from planning.scene.measuring.camera_views import CameraView
 from planning.scene.scene import Scene
 from solvers.covers.cover import DEFAULT_BUDGET
 from solvers.covers.paired.pair_cover import solve_most_pairs, solve_pair_cover

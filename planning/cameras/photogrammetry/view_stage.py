@@ -7,15 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.cameras.camera_cover import n_fixed
+from planning.model.devices.planned import PlannedCamera
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.planned import PlannedCamera
 from planning.model.words import stopped_words
 from planning.proofs.candidate_certificate import PlannedStage, certified
 from planning.proofs.quotas import Quotas, RegionFloors
 from planning.proofs.selection import Selection
-from planning.scene.camera_views import CandidateViews
 from planning.scene.draws import DRAWS
 from planning.scene.limits.view_pair_limits import MEASURED_BY_VIEWS, VIEW_CAUSES
+from planning.scene.measuring.camera_views import CandidateViews
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from solvers.covers.paired.pair_rows import pair_rows

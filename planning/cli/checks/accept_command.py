@@ -13,7 +13,7 @@ from geometry.parallel import n_threads
 from planning.cli.console import print_json, reporter
 from planning.experiments.acceptance.acceptance import Acceptance, Quantity, accept
 from planning.experiments.acceptance.artefacts import BAR, N_PLATES, PLATE, SPHERE
-from planning.model.calibration_errors import CalibrationErrors
+from planning.model.devices.calibration_errors import CalibrationErrors
 from planning.model.plan import RigPlan
 from planning.verify.reconstruction.scanner import Scanner
 

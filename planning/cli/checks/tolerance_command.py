@@ -8,7 +8,7 @@ from threadpoolctl import threadpool_limits
 
 from geometry.parallel import n_threads
 from planning.cli.console import print_json, reporter, writable
-from planning.model.calibration_errors import CalibrationErrors, Mounting
+from planning.model.devices.calibration_errors import CalibrationErrors, Mounting
 from planning.model.errors import InputError
 from planning.model.plan import RigPlan
 from planning.report.tolerance.studies import FILE, StudyFile

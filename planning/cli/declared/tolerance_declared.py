@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from planning.cli.console import PlanFile, Share, output_options, run, threads_option
-from planning.model.calibration_errors import MOST_FOCAL
+from planning.model.devices.calibration_errors import MOST_FOCAL
 
 _LENGTHS = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0}
 _ANGLES = {"deg": math.pi / 180.0, "mrad": 1e-3, "rad": 1.0}

@@ -9,8 +9,8 @@ import numpy as np
 from planning.model.document.certificates import Certificate
 from planning.model.plan import RigPlan
 from planning.model.words import percent
+from planning.report.summary.devices.station_lines import STATIONS, device_counts
 from planning.report.summary.shortfall import missing
-from planning.report.summary.station_lines import STATIONS, device_counts
 
 _NONE = "-"
 # Poses are written to 0.01 mm; a turn by as much over a metre.

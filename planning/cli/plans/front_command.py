@@ -12,9 +12,9 @@ from planning.model.files import write_together
 from planning.report.drawing.front_picture import draw_front
 from planning.rig.rig import load_rig
 from planning.rig.wishes import Wishes
-from planning.steps.carried import pattern_of_rig
 from planning.steps.front.kept_front import FRONT_FILE, KeptFront
 from planning.steps.front.plan_front import plan_front
+from planning.steps.stations.carried import pattern_of_rig
 
 from .kept_fronts import front_folder
 from .plan_command import read_fixed, read_object, timed

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from geometry.arrays import Array
-from planning.model.calibration_errors import CalibrationErrors
+from planning.model.devices.calibration_errors import CalibrationErrors
 from planning.verify.reconstruction.calibration import (
     CameraCalibration,
     ProjectorCalibration,

@@ -12,10 +12,10 @@ from geometry.devices import DeviceModel, ParallelModel, PinholeModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import inverse, transform
 from geometry.shapes.boxes import OrientedBox
-from planning.model.bodies import Body
-from planning.model.device_poses import moved_to
+from planning.model.devices.bodies import Body
+from planning.model.devices.device_poses import moved_to
+from planning.model.devices.planned import PlannedCamera
 from planning.model.plan import RigPlan
-from planning.model.planned import PlannedCamera
 from planning.scene.placed_bodies import Device, kind_of, placed_box
 
 from .export_frames import ExportFrame

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
-from planning.model.planned import PlannedCamera
+from planning.model.devices.planned import PlannedCamera
 from planning.verify.reconstruction.render.mitsuba.materials import Surface
 from planning.verify.reconstruction.render.mitsuba.scene_files import write_scenes
 from planning.verify.reconstruction.render.mitsuba.scene_text import SceneError

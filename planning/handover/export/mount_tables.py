@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from geometry.arrays import Array
 from geometry.poses import horizontal_axes, transform
-from planning.report.summary.device_lines import axis_name, standing_angles
+from planning.report.summary.devices.device_lines import axis_name, standing_angles
 
 from .exported_rig import Content, ExportedDevice, ExportedRig
 

@@ -6,9 +6,9 @@ import numpy as np
 from pydantic import model_validator
 
 from geometry.devices import ParallelModel, PinholeModel
-from planning.model.bodies import Body
+from planning.model.devices.bodies import Body
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.light.dense_code import DenseCode
-from planning.model.planned import PlannedCamera, PlannedProjector
 
 from .part import Interval, Matrix3, Part, Pose, Resolution, Vector3
 from .ring_records import RingSharesRecord, RingsRecord, are_radii

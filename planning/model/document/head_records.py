@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
-from planning.model.bodies import Body
-from planning.model.heads import (
+from planning.model.devices.bodies import Body
+from planning.model.devices.heads import (
     Head,
     HeadDevice,
     HeadFigures,

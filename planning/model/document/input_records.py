@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from geometry.devices import ParallelModel, PinholeModel
-from planning.model.bodies import Body
+from planning.model.devices.bodies import Body
 
 from .head_records import CarrierRecord, HeadRecord, TurntableRecord
 from .part import Interval, Matrix3, Part, Resolution, Vector3

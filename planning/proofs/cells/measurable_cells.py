@@ -30,7 +30,7 @@ from planning.scene.codes.surfaces import CodedPixels
 from planning.scene.limits.camera_limits import CAMERA_LIMITS, CellView
 from planning.scene.limits.limit import may_hold
 from planning.scene.limits.pair_limits import PAIR_LIMITS
-from planning.scene.measured import LitSamples
+from planning.scene.measuring.measured import LitSamples
 
 from .crossings import Cone, PixelCrossings, RingCrossings, dot, nearest_cos
 from .image_cone import ImageCone, image_cone

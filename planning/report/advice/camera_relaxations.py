@@ -13,20 +13,20 @@ import numpy as np
 
 from planning.cameras.camera_cover import NothingMeasuredError, n_fixed
 from planning.cameras.proved_cameras import CameraStage
+from planning.model.devices.planned import PlannedCamera
 from planning.model.document.coverage_records import Relaxation
-from planning.model.planned import PlannedCamera
 from planning.model.words import percent
 from planning.proofs.quotas import required_samples
-from planning.report.claims import Claims
-from planning.report.judged import Devices
-from planning.report.reach import measured_by_any
+from planning.report.claims.claims import Claims
+from planning.report.claims.judged import Devices
+from planning.report.claims.reach import measured_by_any
 from planning.rig.rig import Rig
 from planning.scene.draws import DRAWS
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.limit import LimitRelaxation, Mask
 from planning.scene.limits.pair_limits import CAUSES, MEASURED
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.measured import LitSamples, lit_samples, taken
+from planning.scene.measuring.measured import LitSamples, lit_samples, taken
 from planning.scene.scene import Scene
 from planning.scene.workspace.model_candidates import one_of_each
 

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.scene import measurability
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.scene.lighting import stands_between
 from planning.scene.limits.camera_limits import (
     CAMERA_LIMITS,
@@ -23,7 +22,8 @@ from planning.scene.limits.limit import LimitRelaxation, violated
 from planning.scene.limits.pair_limits import CAUSES, PAIR_LIMITS
 from planning.scene.limits.projector_limits import CAUSES as PROJECTOR_CAUSES
 from planning.scene.limits.projector_limits import PROJECTOR_LIMITS, ProjectorView
-from planning.scene.measured import LitSamples, pairs_of
+from planning.scene.measuring import measurability
+from planning.scene.measuring.measured import LitSamples, pairs_of
 from planning.scene.samples import SampleColumns, Target
 from planning.scene.scene import Scene
 

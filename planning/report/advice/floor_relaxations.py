@@ -13,10 +13,10 @@ from planning.model.document.coverage_records import RegionRecord
 from planning.model.words import count_words
 from planning.projectors.candidate_set import CandidateSet
 from planning.proofs.selection import fewest_of
-from planning.report.judged import Devices
-from planning.report.region_claims import RegionSamples
+from planning.report.claims.judged import Devices
+from planning.report.claims.region_claims import RegionSamples
 from planning.rig.rig import Rig
-from planning.scene.measured import lit_samples
+from planning.scene.measuring.measured import lit_samples
 from solvers.status import SolveStatus
 
 from .camera_relaxations import least_demands

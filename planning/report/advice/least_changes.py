@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import PinholeModel
+from planning.model.devices.planned import PlannedProjector
 from planning.model.document.coverage_records import Relaxation
-from planning.model.planned import PlannedProjector
 from planning.model.requirements import Requirements, Workspace
 from planning.proofs.selection import cover_problem
 from planning.rig import optics

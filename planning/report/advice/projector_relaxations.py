@@ -10,12 +10,12 @@ from functools import reduce
 
 import numpy as np
 
+from planning.model.devices.planned import PlannedProjector
 from planning.model.document.coverage_records import Relaxation
-from planning.model.planned import PlannedProjector
 from planning.projectors.candidate_set import NothingLitError
 from planning.projectors.projector_stage import ProjectorStage
 from planning.proofs.quotas import required_samples
-from planning.report.reach import furthest_lit
+from planning.report.claims.reach import furthest_lit
 from planning.scene.draws import DRAWS
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.samples import Target

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.scene.scene import Scene
 
 

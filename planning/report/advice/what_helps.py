@@ -6,8 +6,8 @@ from planning.model.document.certificates import Certificate, Certificates
 from planning.model.document.coverage_records import Coverage
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
-from planning.report.claims import Claims
-from planning.report.judged import Devices
+from planning.report.claims.claims import Claims
+from planning.report.claims.judged import Devices
 from planning.report.partial_plan import PartialPlan
 
 from .camera_relaxations import for_so_many, out_of_reach

@@ -9,7 +9,7 @@ from geometry.mesh.sampling import SurfaceSamples
 from geometry.parallel import n_threads
 from planning.cameras.photogrammetry.measured_views import measured_views
 from planning.model.plan import RigPlan
-from planning.scene.measured import lit_samples, measured_by
+from planning.scene.measuring.measured import lit_samples, measured_by
 from planning.scene.placed_bodies import Obstruction
 from planning.scene.samples import Target
 from planning.scene.scene import Scene

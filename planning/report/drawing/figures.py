@@ -10,9 +10,9 @@ from geometry.devices import ParallelModel, PinholeModel
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import transform
 from geometry.shapes.boxes import OrientedBox
-from planning.model.bodies import Box
+from planning.model.devices.bodies import Box
+from planning.model.devices.planned import PlannedProjector
 from planning.model.plan import RigPlan
-from planning.model.planned import PlannedProjector
 from planning.scene.codes.patterns import pattern_of
 from planning.scene.placed_bodies import Device, placed_box
 

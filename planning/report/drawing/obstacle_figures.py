@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.topology import face_pairs
-from planning.model.bodies import Obstacle
+from planning.model.devices.bodies import Obstacle
 from planning.model.plan import RigPlan
 
 from .panel import Panel

@@ -15,8 +15,8 @@ from PIL import Image, ImageDraw
 from geometry.rays.rays import RayCaster
 from planning.model.plan import RigPlan
 from planning.model.words import count_words
-from planning.report.summary.device_lines import devices_words
-from planning.report.summary.station_lines import STATIONS
+from planning.report.summary.devices.device_lines import devices_words
+from planning.report.summary.devices.station_lines import STATIONS
 from planning.scene.placed_bodies import kind_of
 
 from .error_bar import draw_error_bar

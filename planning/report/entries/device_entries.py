@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from geometry.mesh.mesh import MeshSource, TriangleMesh
 from geometry.regions.regions import DominantRegions
 from geometry.repair.hollow import MeshShell
-from planning.model.bodies import Mount
-from planning.model.device_poses import DECIMALS, rounded_pose
+from planning.model.devices.bodies import Mount
+from planning.model.devices.device_poses import DECIMALS, rounded_pose
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.document.coverage_records import RegionRecord
 from planning.model.document.device_records import (
     CameraRecord,
@@ -33,15 +34,14 @@ from planning.model.document.ring_records import (
     RingAxes,
     RingsRecord,
 )
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.surface import Surface
-from planning.report.claims import Claims
-from planning.report.judged import Devices
+from planning.report.claims.claims import Claims
+from planning.report.claims.judged import Devices
 from planning.report.partial_plan import PartialPlan, Prepared
 from planning.rings.ring_shares import ring_shares
 from planning.rings.written_rings import told_again
 from planning.scene.interest import Interest
-from planning.scene.measured import lit_samples, measured_by
+from planning.scene.measuring.measured import lit_samples, measured_by
 from planning.scene.placed_bodies import Device
 from planning.scene.scene import Scene
 from planning.scene.workspace.mount_settings import device_from_mount

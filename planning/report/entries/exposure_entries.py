@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.devices.planned import PlannedProjector
 from planning.model.document.device_records import ExposureRecord, GreySample
 from planning.model.light.light_budget import LightBudget
-from planning.model.planned import PlannedProjector
-from planning.report.claims import Claims
-from planning.report.judged import Devices
+from planning.report.claims.claims import Claims
+from planning.report.claims.judged import Devices
 from planning.scene.codes.patterns import panel_light
 from planning.scene.lighting import (
     assigned_projectors,

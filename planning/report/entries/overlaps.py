@@ -20,8 +20,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.devices.planned import PlannedProjector
 from planning.model.document.coverage_records import ExposureSchedule, Overlap
-from planning.model.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 from planning.scene import lighting
 from planning.scene.codes.patterns import pattern_of

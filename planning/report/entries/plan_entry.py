@@ -27,7 +27,7 @@ from planning.model.document.plan_document import (
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
 from planning.model.surface import Surface
-from planning.report.claims import Claims
+from planning.report.claims.claims import Claims
 from planning.report.partial_plan import Prepared
 
 from . import device_entries as entries

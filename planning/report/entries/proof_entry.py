@@ -18,7 +18,7 @@ from planning.report.partial_plan import PartialPlan
 from planning.scene.draws import DRAWS, Draw
 from planning.scene.lighting import light_on, lit_stages
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.measured import LitSamples, measured_by
+from planning.scene.measuring.measured import LitSamples, measured_by
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from solvers.covers.cover import reduced_problem

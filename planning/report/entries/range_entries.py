@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from geometry.shapes.best_sphere import BestSphere
 from planning.cameras.baselines.baseline_rows import angles_and_fields
 from planning.cameras.baselines.coverage_triangle import largest_baseline
+from planning.model.devices.planned import PlannedCamera
 from planning.model.document.device_records import BaselineRow
 from planning.model.document.input_records import (
     EstimatedSphere,
@@ -16,7 +17,6 @@ from planning.model.document.input_records import (
     RangesRecord,
     RefusedPoint,
 )
-from planning.model.planned import PlannedCamera
 from planning.rig.range_guard import Guard
 from planning.scene.ranges.ranged_body import SIGNIFICANCE, RangedBody, refusal_line
 

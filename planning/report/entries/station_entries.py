@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from planning.model.device_poses import DECIMALS, rounded_pose
+from planning.model.devices.device_poses import DECIMALS, rounded_pose
 from planning.model.document.station_records import (
     Stationed,
     StationRecord,
     StationsRecord,
 )
-from planning.report.judged import Devices
+from planning.report.claims.judged import Devices
 
 
 def stations_record(stationed: Stationed, devices: Devices) -> StationsRecord:

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from geometry.arrays import Array, Ints
-from planning.model.bodies import Obstacle
+from planning.model.devices.bodies import Obstacle
 from planning.model.surface import Surface
-from planning.report.judged import Devices
+from planning.report.claims.judged import Devices
 from planning.report.partial_plan import Prepared
 from planning.scene.placed_bodies import Device
 from planning.scene.scene import Scene

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.calibration_errors import Survival
+from planning.model.devices.calibration_errors import Survival
 from planning.model.document.survival_records import (
     LossRecord,
     SurvivalRecord,
@@ -17,11 +17,11 @@ from planning.model.document.survival_records import (
 )
 from planning.model.requirements import Requirements
 from planning.proofs.surviving_counts import SurvivingCount
-from planning.report.claims import Claims
-from planning.report.judged import Devices
+from planning.report.claims.claims import Claims
+from planning.report.claims.judged import Devices
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.measured import (
+from planning.scene.measuring.measured import (
     LitSamples,
     measured_fold,
     measuring_pairs,

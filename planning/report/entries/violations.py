@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from geometry.poses import inverse, transform
 from geometry.shapes.boxes import box_gap
-from planning.model.bodies import Box
+from planning.model.devices.bodies import Box
 from planning.model.document.device_records import Limit, ViolationRecord
 from planning.model.requirements import Workspace
 from planning.scene.placed_bodies import (

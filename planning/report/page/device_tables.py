@@ -8,7 +8,7 @@ from planning.model.document.device_records import ProjectorRecord
 from planning.model.plan import RigPlan
 from planning.model.words import area_words, percent
 from planning.report.summary.coverage_lines import schedule_lines
-from planning.report.summary.device_lines import axis_name, gap_lines, standing
+from planning.report.summary.devices.device_lines import axis_name, gap_lines, standing
 from planning.rings.acquisition import n_frames
 
 from .markup import table

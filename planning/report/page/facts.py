@@ -8,9 +8,9 @@ import numpy as np
 
 from geometry.arrays import Array
 from geometry.devices import PinholeModel
-from planning.model.bodies import Box
+from planning.model.devices.bodies import Box
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.plan import RigPlan
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.report.drawing.obstacle_figures import drawn_obstacles
 from planning.rings.acquisition import n_frames
 from planning.verify.audit.audit_samples import AuditSamples

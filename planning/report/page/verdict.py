@@ -6,9 +6,9 @@ from html import escape
 from planning.model.plan import RigPlan
 from planning.model.words import percent
 from planning.report.summary.check_lines import unchecked
-from planning.report.summary.device_lines import devices_words
+from planning.report.summary.devices.device_lines import devices_words
+from planning.report.summary.devices.station_lines import title_words
 from planning.report.summary.shortfall import shortfalls
-from planning.report.summary.station_lines import title_words
 
 from .markup import element, paragraphs, table
 

@@ -14,11 +14,11 @@ from scipy.spatial import ConvexHull, QhullError
 from geometry.arrays import Array
 from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import horizontal_axes
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.plan import RigPlan
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.report.drawing.figures import device_figures
 from planning.report.drawing.panel import round_length
-from planning.report.summary.device_lines import axis_name
+from planning.report.summary.devices.device_lines import axis_name
 from planning.scene.placed_bodies import kind_of
 
 from .markup import element

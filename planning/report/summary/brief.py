@@ -10,21 +10,21 @@ from textwrap import wrap
 import numpy as np
 
 from geometry.poses import horizontal_axes
-from planning.model.document.certificates import Certificate
 from planning.model.plan import RigPlan
 from planning.model.words import count_words, percent
 from planning.report.tolerance.joint_lines import joint_words
 from planning.report.tolerance.robust_lines import robust_cost
-from planning.report.tolerance.survival_lines import counted_words, losses_words
+from planning.report.tolerance.survival_lines import losses_words
 
 from .cause_words import causes_line
 from .check_lines import error_words, unchecked
-from .device_lines import axis_name, devices_words, models_line, standing, used_up
-from .family_lines import family_bounds, members_words
+from .count_lines import Block, fewest
+from .devices.device_lines import axis_name, devices_words, models_line, standing
+from .devices.station_lines import moves_words, title_words
+from .family_lines import members_words
 from .proof_lines import target_words
 from .region_lines import worst_region
 from .shortfall import Shortfall, missing
-from .station_lines import fewest_words, moves_words, title_words
 from .summary import lost_in_field
 from .warning_lines import warnings
 
@@ -49,7 +49,7 @@ def brief(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
     blocks = [
         *([("MODELS", models, 3)] if models else []),
         *_measured(plan),
-        *_fewest(plan),
+        *fewest(plan),
         *_surviving(plan),
         *_robust(plan),
         *_missed(plan, short),
@@ -62,9 +62,6 @@ def brief(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
     return "\n".join([*head, *devices, *rest])
 
 
-_Block = tuple[str, str, int]
-
-
 def _block(label: str, text: str, most: int) -> list[str]:
     """Wrap a text behind its label; what goes beyond `most` lines ends with dots."""
     lines = wrap(text, COLUMNS - _LABEL, break_on_hyphens=False) or [""]
@@ -74,7 +71,7 @@ def _block(label: str, text: str, most: int) -> list[str]:
     return [f"{'' if k else label:<{_LABEL}}{line}" for k, line in enumerate(lines)]
 
 
-def _head(plan: RigPlan, short: Sequence[Shortfall]) -> Iterator[_Block]:
+def _head(plan: RigPlan, short: Sequence[Shortfall]) -> Iterator[Block]:
     document, rig = plan.document, plan.document.rig
     devices = devices_words(plan)
     if document.stations is not None:
@@ -144,7 +141,7 @@ def _devices(plan: RigPlan, room: int) -> list[str]:
     return lines
 
 
-def _measured(plan: RigPlan) -> Iterator[_Block]:
+def _measured(plan: RigPlan) -> Iterator[Block]:
     areas, asked = plan.coverage.target, plan.requirements
     sigma, limit = plan.coverage.sigma, asked.triangulation.max_sigma_m
     lit = _share(areas.lit_m2, areas.reachable_by_projectors_m2)
@@ -172,44 +169,14 @@ def _measured(plan: RigPlan) -> Iterator[_Block]:
     )
 
 
-def _fewest(plan: RigPlan) -> Iterator[_Block]:
-    """Say what is known of fewer devices, over the candidates and over every pose."""
-    if plan.document.evaluation is not None:
-        return
-    if plan.members:
-        for label, words in zip(("FEWEST", ""), family_bounds(plan), strict=True):
-            yield label, words, 2
-        return
-    if fewest := fewest_words(plan):
-        yield "FEWEST", fewest, 2
-        return
-    proofs = plan.document.certificates
-    kinds = {"camera": proofs.cameras}
-    if proofs.projectors is not None:
-        kinds = {"projector": proofs.projectors, **kinds}
-    if plan.document.survival is not None:
-        yield from zip(("FEWEST", ""), counted_words(plan), (2, 2), strict=True)
-        return
-    if len(kinds) > 1 and all(_over_all(proof) for proof in kinds.values()):
-        counts = [count_words(proof.count, kind) for kind, proof in kinds.items()]
-        held = {proof.candidates.status for proof in kinds.values()}
-        over = "proved over candidates and over every pose"
-        if held != {"proved"}:
-            over = "proved over every pose"
-        yield "FEWEST", f"{counts[0]} and, given these, {counts[1]}: {over}", 2
-        return
-    for label, (kind, proof) in zip(("FEWEST", ""), kinds.items(), strict=False):
-        yield label, _proved(kind, proof, used_up(plan.document, kind)), 2
-
-
-def _surviving(plan: RigPlan) -> Iterator[_Block]:
+def _surviving(plan: RigPlan) -> Iterator[Block]:
     """Say what any one loss leaves and costs, and what planning together saved."""
     for words in (losses_words(plan), joint_words(plan)):
         if words is not None:
             yield *words, 2
 
 
-def _robust(plan: RigPlan) -> Iterator[_Block]:
+def _robust(plan: RigPlan) -> Iterator[Block]:
     """Say how many drawn rigs meet what is asked, and what that took."""
     found = plan.document.robust
     if found is None:
@@ -220,40 +187,7 @@ def _robust(plan: RigPlan) -> Iterator[_Block]:
     yield "ROBUST", f"{met}{without} (plan show --all)", 1
 
 
-def _over_all(proof: Certificate) -> bool:
-    bound = proof.continuous
-    return (
-        proof.status == "optimal"
-        and proof.needed.count <= proof.count
-        and bound is not None
-        and bound.lower_bound >= proof.count
-    )
-
-
-def _proved(kind: str, proof: Certificate, gone: str) -> str:
-    needed, least = proof.needed, proof.candidates.lower_bound
-    status, count = proof.candidates.status, count_words(proof.count, kind)
-    over = f"{status} over the candidates"
-    if needed.count > proof.count:
-        words = f"at least {needed.lower_bound} {kind}s {over}, "
-        most = f"no more of {gone} in stock"
-        most = most if gone else f"at most {proof.count} was asked"
-        return f"{words}{needed.count} suffice; {most}"
-    if proof.status != "optimal":
-        return f"{count}; at least {least} {_are(least)} needed, {over}"
-    if proof.continuous is None:
-        return f"{count}: {over}; nothing is proved over every pose"
-    if _over_all(proof):
-        return f"{count}: {over}, proved over every pose in the workspace"
-    least = proof.continuous.lower_bound
-    return f"{count}: {over}; over every pose at least {least} {_are(least)} needed"
-
-
-def _are(count: int) -> str:
-    return "is" if count == 1 else "are"
-
-
-def _missed(plan: RigPlan, short: Sequence[Shortfall]) -> Iterator[_Block]:
+def _missed(plan: RigPlan, short: Sequence[Shortfall]) -> Iterator[Block]:
     """What isn't measured, where it is worst, and the one or two things that help."""
     worst, areas = worst_region(plan), plan.coverage.target
     if worst is not None:
@@ -277,7 +211,7 @@ def _helps(short: Sequence[Shortfall]) -> list[str]:
     return [told[key] for key in dict.fromkeys(t.split(" (")[0] for t in every)][:2]
 
 
-def _check(plan: RigPlan) -> Iterator[_Block]:
+def _check(plan: RigPlan) -> Iterator[Block]:
     check = plan.document.reconstruction
     if check is None:
         return
@@ -298,7 +232,7 @@ def _check(plan: RigPlan) -> Iterator[_Block]:
         yield "WARNING", warning, 2
 
 
-def _end(plan: RigPlan, files: Sequence[str]) -> Iterator[_Block]:
+def _end(plan: RigPlan, files: Sequence[str]) -> Iterator[Block]:
     cost = plan.document.cost
     if cost.n_frames and not plan.document.evaluation:
         seconds = (

@@ -2,7 +2,7 @@
 
 import math
 
-from planning.model.calibration_errors import CalibrationErrors
+from planning.model.devices.calibration_errors import CalibrationErrors
 from planning.model.document.coverage_records import CameraMarginal, ProjectorMarginal
 from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan

@@ -7,7 +7,7 @@ from planning.model.words import count_words, labelled, percent
 from planning.report.tolerance.survival_lines import surviving_proofs
 from planning.scene.lights import light_of
 
-from .station_lines import fewest_words
+from .devices.station_lines import fewest_words
 
 _EXCLUDED = {
     "projector_beam": "lie outside the beam",

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from planning.model.devices.planned import PlannedProjector
 from planning.model.document.device_records import ProjectorRecord
 from planning.model.document.plan_document import PlanDocument
 from planning.model.document.ring_records import (
@@ -14,7 +15,6 @@ from planning.model.document.ring_records import (
 )
 from planning.model.light.dense_code import DenseCode
 from planning.model.plan import RigPlan
-from planning.model.planned import PlannedProjector
 from planning.model.words import labelled, percent
 from planning.rings.acquisition import n_frames
 from planning.rings.ring_stage import tolerance_m

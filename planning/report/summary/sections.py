@@ -10,14 +10,18 @@ from planning.report.tolerance.survival_lines import survival_lines
 
 from .check_lines import check_lines, cost_lines
 from .coverage_lines import coverage_lines, marginal_lines, schedule_lines
-from .device_lines import device_lines, gap_lines, mount_lines
+from .devices.device_lines import (
+    device_lines,
+    gap_lines,
+    mount_lines,
+)
+from .devices.station_lines import station_lines
+from .devices.zone_lines import zone_lines
 from .family_lines import family_lines
 from .light_lines import light_lines
 from .proof_lines import proof_lines
 from .region_lines import region_table
 from .ring_lines import code_lines, range_lines, ring_lines
-from .station_lines import station_lines
-from .zone_lines import zone_lines
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from planning.scene.limits.projector_limits import PROJECTOR_LIMITS
 from planning.scene.limits.view_pair_limits import VIEW_PAIR_LIMITS
 
 from .cause_words import areas_line, causes_line, rounded_down
-from .device_lines import used_up
+from .devices.device_lines import used_up
 from .region_lines import floor_shortfalls
 
 # What accepts the one requirement that a plan misses.

@@ -16,11 +16,16 @@ from planning.report.tolerance.survival_lines import survival_lines
 
 from .check_lines import check_lines, cost_lines, unchecked
 from .coverage_lines import coverage_lines, marginal_lines
-from .device_lines import axis_name, device_lines, devices_words, mount_lines
+from .devices.device_lines import (
+    axis_name,
+    device_lines,
+    devices_words,
+    mount_lines,
+)
+from .devices.station_lines import station_lines
 from .light_lines import light_lines
 from .proof_lines import proof_lines
 from .ring_lines import code_lines, range_lines, ring_lines
-from .station_lines import station_lines
 from .warning_lines import warning_lines
 
 # An object under this share of the field is taken to be in another unit.

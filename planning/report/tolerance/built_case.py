@@ -8,22 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.parallel import n_threads
-from planning.model.calibration_errors import (
+from planning.model.devices.calibration_errors import (
     AS_PLANNED,
     PERFECT,
     CalibrationErrors,
     Mounting,
 )
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.plan import RigPlan
-from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.report.judged import Judged
+from planning.report.claims.judged import Judged
 from planning.report.written_plan import written_devices, written_scene
-from planning.scene.camera_views import camera_views
 from planning.scene.draws import DRAWS
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.measurability import pair_quality
-from planning.scene.measured import LitSamples, Pair, pairs_of
+from planning.scene.measuring.camera_views import camera_views
+from planning.scene.measuring.measurability import pair_quality
+from planning.scene.measuring.measured import LitSamples, Pair, pairs_of
 from planning.scene.samples import Target, merged
 from planning.scene.scene import Scene
 

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from geometry.devices import ParallelModel
-from planning.model.calibration_errors import CalibrationErrors, Mounting
-from planning.model.device_poses import moved_to
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.calibration_errors import CalibrationErrors, Mounting
+from planning.model.devices.device_poses import moved_to
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 
 _Array = NDArray[np.float64]
 _D = TypeVar("_D", PlannedProjector, PlannedCamera)

@@ -15,7 +15,7 @@ from functools import cache
 from math import ceil, inf
 
 from geometry.parallel import mapped, n_threads
-from planning.model.calibration_errors import (
+from planning.model.devices.calibration_errors import (
     MOST_FOCAL,
     PERFECT,
     CalibrationErrors,

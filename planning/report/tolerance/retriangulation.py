@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from geometry.arrays import Array
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import inverse, transform
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.scene.lights import light_of
 
 from .drawn_rigs import moved_pose

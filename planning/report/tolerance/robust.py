@@ -19,7 +19,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from planning.cameras.surer_cameras import Aim
-from planning.model.calibration_errors import AS_PLANNED, PERFECT, Robust
+from planning.model.devices.calibration_errors import AS_PLANNED, PERFECT, Robust
 from planning.model.document.coverage_records import RobustRecord
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.plan import InterruptedPlanError, RigPlan

@@ -1,6 +1,6 @@
 """What a plan says of rigs that aren't built exactly as planned."""
 
-from planning.model.calibration_errors import PERFECT
+from planning.model.devices.calibration_errors import PERFECT
 from planning.model.document.coverage_records import RobustRecord
 from planning.model.plan import RigPlan
 from planning.model.words import count_words, labelled, percent

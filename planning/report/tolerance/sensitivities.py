@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from geometry.parallel import mapped
-from planning.model.calibration_errors import AS_PLANNED, Mounting
+from planning.model.devices.calibration_errors import AS_PLANNED, Mounting
 from planning.model.progress import Report
 
 from .built_case import BuiltCase

@@ -11,7 +11,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from planning.model.calibration_errors import CalibrationErrors, Mounting
+from planning.model.devices.calibration_errors import CalibrationErrors, Mounting
 from planning.model.errors import InputError
 from planning.model.files import reading, write_atomically
 

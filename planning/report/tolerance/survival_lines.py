@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from planning.model.calibration_errors import Survival
+from planning.model.devices.calibration_errors import Survival
 from planning.model.document.survival_records import (
     LossRecord,
     SurvivalRecord,

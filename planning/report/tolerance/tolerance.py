@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from geometry.parallel import mapped, n_threads
-from planning.model.calibration_errors import (
+from planning.model.devices.calibration_errors import (
     AS_PLANNED,
     PERFECT,
     CalibrationErrors,

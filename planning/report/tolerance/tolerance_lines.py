@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from math import degrees
 
-from planning.model.calibration_errors import CalibrationErrors, Mounting
+from planning.model.devices.calibration_errors import CalibrationErrors, Mounting
 from planning.model.words import count_words, labelled, percent
 
 from .asked import FIGURES

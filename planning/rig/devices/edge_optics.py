@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from geometry.devices import DeviceModel, PinholeModel
+from planning.model.devices.planned import EDGE_VARIANCE, edge_linearity_px
 from planning.model.light.drawn_edges import DrawnEdges
-from planning.model.planned import EDGE_VARIANCE, edge_linearity_px
 
 # A decoder asks the pixels beside an edge for a level of 0.18; 1 px off one that is
 # blurred by w, as a standard deviation, it is erf(1 / (sqrt(2) w)) [px].

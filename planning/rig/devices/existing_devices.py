@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from planning.model.bodies import Body, Existing
-from planning.model.device_poses import rounded_pose
+from planning.model.devices.bodies import Body, Existing
+from planning.model.devices.device_poses import rounded_pose
 from planning.model.errors import InfeasibleLimitsError, RigError
 from planning.model.requirements import Requirements, Workspace
 from planning.rig.existing_tables import ExistingTable

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from geometry.devices import DeviceModel
-from planning.model.bodies import Body
+from planning.model.devices.bodies import Body
 from planning.model.errors import RigError
 from planning.model.light.drawn_edges import DrawnEdges
 from planning.model.requirements import Stock

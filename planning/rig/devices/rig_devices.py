@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 
 from geometry.devices import DeviceModel, ParallelModel, PinholeModel
-from planning.model.bodies import Body
+from planning.model.devices.bodies import Body
 from planning.model.errors import RigError
 from planning.model.light.drawn_edges import DrawnEdges
 from planning.model.light.light_budget import LightBudget

@@ -8,7 +8,7 @@ import numpy as np
 from geometry.arrays import Array, Mask
 from geometry.devices import DeviceModel, PinholeModel
 from geometry.poses import inverse
-from planning.model.heads import Head, HeadDevice, Kind, Stations, Turntable
+from planning.model.devices.heads import Head, HeadDevice, Kind, Stations, Turntable
 from planning.rig.rig_tables import RigTable
 
 from .models import Model, named

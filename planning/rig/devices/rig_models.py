@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Literal
 
 from geometry.devices import DeviceModel, ParallelModel, PinholeModel
-from planning.model.bodies import Mount
+from planning.model.devices.bodies import Mount
+from planning.model.devices.heads import Head, Stations, Turntable
 from planning.model.errors import RigError
-from planning.model.heads import Head, Stations, Turntable
 from planning.rig.rig_tables import ParallelTable, PinholeTable, RigTable
 
 from .models import Model, models_of, named

@@ -7,8 +7,8 @@ import numpy as np
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
 from geometry.arrays import Array
-from planning.model.bodies import Triple
-from planning.model.heads import Stations, Turntable
+from planning.model.devices.bodies import Triple
+from planning.model.devices.heads import Stations, Turntable
 from planning.model.table_types import Axis, Name, Table
 
 MOST_STEPS, MOST_STATIONS = 360, 1_000

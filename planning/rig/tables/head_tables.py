@@ -13,9 +13,15 @@ from pydantic import Field, model_validator
 
 from geometry.arrays import Array, Mask
 from geometry.devices import DeviceModel
-from planning.model.bodies import Body, BodyTable
-from planning.model.device_poses import rounded_pose
-from planning.model.heads import Head, HeadDevice, HeadFigures, Kind, MeasuringVolume
+from planning.model.devices.bodies import Body, BodyTable
+from planning.model.devices.device_poses import rounded_pose
+from planning.model.devices.heads import (
+    Head,
+    HeadDevice,
+    HeadFigures,
+    Kind,
+    MeasuringVolume,
+)
 from planning.model.table_types import (
     Axis,
     Name,

@@ -5,8 +5,8 @@ from typing import TypeVar
 
 import numpy as np
 
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.scene.placed_bodies import (
     CLEARANCE_M,
     Device,

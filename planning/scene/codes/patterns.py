@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from geometry.arrays import lengths
 from geometry.devices import ParallelModel
 from geometry.poses import inverse, transform
+from planning.model.devices.planned import PlannedProjector
 from planning.model.light.dense_code import DenseCode
-from planning.model.planned import PlannedProjector
 from planning.scene.lights import light_of
 
 from .surfaces import Coded, CodedPixels, CodeSurfaces, PanelLight, PanelRays

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from geometry.arrays import lengths, rows_of
 from geometry.devices import ParallelModel
 from geometry.poses import inverse, transform
+from planning.model.devices.planned import PlannedProjector
 from planning.model.light.dense_code import DenseCode
-from planning.model.planned import PlannedProjector
 from planning.scene.samples import SampleArrays
 
 _Array = NDArray[np.float64]

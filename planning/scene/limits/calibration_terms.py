@@ -14,7 +14,7 @@ surfaces of equal code `patterns.surface_levers` has the same three.
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.calibration_errors import CalibrationErrors
+from planning.model.devices.calibration_errors import CalibrationErrors
 
 from .camera_limits import ViewedSamples
 

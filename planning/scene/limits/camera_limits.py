@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from geometry.arrays import lengths
 from geometry.devices import PinholeModel
 from geometry.poses import inverse, transform
-from planning.model.planned import PlannedCamera
+from planning.model.devices.planned import PlannedCamera
 from planning.model.requirements import CameraLimits
 from planning.scene.samples import SampleArrays, Target
 

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.devices.planned import EDGE_VARIANCE, edge_linearity_px
 from planning.model.light.drawn_edges import DrawnEdges
-from planning.model.planned import EDGE_VARIANCE, edge_linearity_px
 
 _Array = NDArray[np.float64]
 

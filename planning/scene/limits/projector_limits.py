@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from geometry.devices import DeviceModel
-from planning.model.planned import PlannedProjector
+from planning.model.devices.planned import PlannedProjector
 from planning.model.requirements import ProjectorLimits
 from planning.scene.codes.patterns import pattern_of
 from planning.scene.lights import light_of

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from geometry.arrays import lengths
 from geometry.directions.cube_map import angle_between
 from geometry.shapes.boxes import OrientedBox, boxes_overlap
-from planning.model.bodies import Box
+from planning.model.devices.bodies import Box
 from planning.model.requirements import Workspace
 
 _Array = NDArray[np.float64]

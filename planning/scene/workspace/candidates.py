@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from geometry.arrays import lengths
 from geometry.devices import DeviceModel, turned_to
 from geometry.poses import fibonacci_cap, look_at
-from planning.model.device_poses import moved_to
+from planning.model.devices.device_poses import moved_to
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Workspace
 from planning.scene.placed_bodies import kind_of
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.poses import horizontal_axes, pan_tilt_roll, turns_of
-from planning.model.bodies import Mount
+from planning.model.devices.bodies import Mount
 from planning.model.requirements import Workspace
 from planning.scene.placed_bodies import Device, kind_of
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.poses import fibonacci_cap
-from planning.model.bodies import Box
+from planning.model.devices.bodies import Box
 from planning.model.requirements import Workspace
 
 from .admissible import admissible, is_zoned

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.bodies import Box
+from planning.model.devices.bodies import Box
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.requirements import Workspace
 

@@ -16,15 +16,15 @@ from planning.cameras.photogrammetry.measured_views import (
     reached_by_views,
     unseen_causes,
 )
+from planning.model.devices.planned import PlannedCamera
 from planning.model.document.coverage_records import (
     Areas,
     Coverage,
     PredictedSigma,
 )
-from planning.model.planned import PlannedCamera
-from planning.report.claims import Claims
-from planning.report.judged import Devices, by_cause
-from planning.report.region_claims import RegionSamples, claim_regions
+from planning.report.claims.claims import Claims
+from planning.report.claims.judged import Devices, by_cause
+from planning.report.claims.region_claims import RegionSamples, claim_regions
 from planning.scene.draws import DRAWS
 from planning.scene.limits.view_pair_limits import VIEW_CAUSES
 from planning.scene.samples import Target, merged

@@ -8,17 +8,17 @@ from planning.cameras.baselines.seams import SampledSurface
 from planning.cameras.photogrammetry.best_pairs import widest_sample
 from planning.cameras.photogrammetry.measured_views import measured_views
 from planning.cameras.photogrammetry.view_stage import ViewStage
+from planning.model.devices.planned import PlannedCamera
 from planning.model.document.certificates import Certificates
 from planning.model.document.coverage_records import CameraMarginal
 from planning.model.plan import RigPlan
-from planning.model.planned import PlannedCamera
 from planning.model.progress import Stopwatch
 from planning.model.requirements import Requirements
-from planning.report.claims import Claims
+from planning.report.claims.claims import Claims
+from planning.report.claims.judged import Devices
 from planning.report.entries import device_entries as entries
 from planning.report.entries.plan_entry import Told, document_of
 from planning.report.entries.surface_entry import surface_of
-from planning.report.judged import Devices
 from planning.report.partial_plan import PlanRequest, Prepared
 from planning.scene.draws import DRAWS
 from planning.scene.scene import Scene

@@ -23,8 +23,8 @@ from planning.projectors.projector_stage import ProjectorStage
 from planning.proofs.candidate_certificate import bodies_left_out, unsought
 from planning.proofs.selection import CandidateCover, Selection, select_fewest
 from planning.report.partial_plan import PartialPlan, Prepared
-from planning.scene.camera_views import CandidateViews
-from planning.scene.measured import LitSamples, taken
+from planning.scene.measuring.camera_views import CandidateViews
+from planning.scene.measuring.measured import LitSamples, taken
 from planning.scene.placed_bodies import Device
 from planning.scene.samples import Target
 from planning.scene.scene import Scene

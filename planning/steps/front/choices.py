@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.cameras.camera_cover import candidate_cover
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.document.ring_records import AxisTaken
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.progress import Stopwatch
 from planning.model.words import count_words
 from planning.projectors.exposures import with_exposures
@@ -19,7 +19,7 @@ from planning.rings.axis_moves import move_ring_axes
 from planning.rings.centred_axes import centred_axes
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.measured import LitSamples, measured_by, taken
+from planning.scene.measuring.measured import LitSamples, measured_by, taken
 
 from .best_counts import MOST, BestCount, best_counts, with_more
 from .front_matrix import FrontMatrix

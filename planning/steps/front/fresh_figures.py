@@ -6,15 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.proofs.quotas import RegionFloors
+from planning.report.claims.reach import furthest_lit, measured_by_any
 from planning.report.entries.device_entries import rounded_camera, rounded_projector
-from planning.report.reach import furthest_lit, measured_by_any
-from planning.scene.camera_views import CameraView, camera_views
 from planning.scene.draws import DRAWS, Draw
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.measured import LitSamples, lit_samples, pairs_of
+from planning.scene.measuring.camera_views import CameraView, camera_views
+from planning.scene.measuring.measured import LitSamples, lit_samples, pairs_of
 from planning.scene.scene import Scene
 
 from .choices import Choice

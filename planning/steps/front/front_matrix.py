@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.cameras.camera_cover import camera_candidate_views
+from planning.model.devices.planned import PlannedCamera
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.planned import PlannedCamera
 from planning.model.progress import Stopwatch
 from planning.projectors.candidate_set import (
     CandidateSet,
@@ -18,9 +18,9 @@ from planning.projectors.candidate_set import (
 from planning.report.advice.projector_relaxations import nothing_lit
 from planning.report.advice.standing_inside import standing_inside
 from planning.report.partial_plan import Prepared
-from planning.scene.camera_views import CameraView, CandidateViews
 from planning.scene.draws import DRAWS
-from planning.scene.measurability import view
+from planning.scene.measuring.camera_views import CameraView, CandidateViews
+from planning.scene.measuring.measurability import view
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 from solvers import solve_cover

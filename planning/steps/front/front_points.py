@@ -4,8 +4,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from planning.model.devices.planned import PlannedProjector
 from planning.model.front import Front, FrontPoint, marked
-from planning.model.planned import PlannedProjector
 from planning.model.progress import Stopwatch
 from planning.rings.acquisition import n_frames, pixels_read
 

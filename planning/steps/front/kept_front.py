@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from planning.model.device_poses import moved_to
+from planning.model.devices.device_poses import moved_to
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.errors import InputError, PlanFileError
 from planning.model.files import reading
 from planning.model.front import Front, FrontPoint
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.projectors.candidate_set import CandidateSet
 from planning.report.partial_plan import Prepared
 from planning.scene.draws import DRAWS

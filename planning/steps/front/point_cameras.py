@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from planning.cameras.camera_cover import CameraCover, candidate_cover
 from planning.cameras.camera_stage import proves_as_much
 from planning.cameras.proved_cameras import CameraStage, camera_stage
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.document.ring_records import AxisTaken
 from planning.model.front import FrontPoint
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.proofs.selection import CandidateCover, Selection, select_fewest
 from planning.report.partial_plan import PartialPlan
 from planning.rings.axis_moves import move_ring_axes
@@ -19,7 +19,7 @@ from planning.rings.centred_axes import centred_axes
 from planning.rings.kept_pairs import rings_for_pairs
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.measured import LitSamples, measured_by, taken
+from planning.scene.measuring.measured import LitSamples, measured_by, taken
 from planning.scene.scene import Scene
 
 from .best_counts import with_more

@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planning.cameras.camera_routes import widest_routes
+from planning.model.devices.planned import PlannedProjector
 from planning.model.document.certificates import Certificate
 from planning.model.front import FrontPoint
 from planning.model.plan import RigPlan
-from planning.model.planned import PlannedProjector
 from planning.model.progress import Stopwatch
 from planning.projectors.exposures import with_exposures
 from planning.projectors.projector_poses import widen_margins

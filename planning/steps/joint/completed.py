@@ -7,8 +7,8 @@ import numpy as np
 from planning.cameras.axis_choice import place_for_axes
 from planning.cameras.camera_cover import NothingMeasuredError, plan_cameras
 from planning.cameras.proved_cameras import CameraStage, camera_stage
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.document.input_records import RigRecord
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.projectors.candidate_set import CandidateSet
 from planning.projectors.exposures import with_exposures
 from planning.projectors.projector_stage import ProjectorStage

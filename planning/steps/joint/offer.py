@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.cameras.camera_cover import measured_of
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.document.input_records import RigRecord
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.projectors.candidate_set import CandidateSet
 from planning.proofs.quotas import Quotas, RegionFloors
 from planning.report.partial_plan import PartialPlan

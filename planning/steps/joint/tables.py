@@ -7,11 +7,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.planned import PlannedCamera, PlannedProjector
-from planning.scene.camera_views import CameraView, camera_views
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.measured import LitSamples, pairs_of
+from planning.scene.measuring.camera_views import CameraView, camera_views
+from planning.scene.measuring.measured import LitSamples, pairs_of
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 

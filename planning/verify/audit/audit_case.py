@@ -7,11 +7,11 @@ from functools import cached_property
 import numpy as np
 
 from geometry.arrays import Array, Mask
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.document.certificates import Certificate
 from planning.model.document.device_records import CameraRecord, ProjectorRecord
 from planning.model.document.input_records import ModelRecord
 from planning.model.plan import RigPlan
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.verify.audit.predicates.audit_devices import (
     AuditCamera,
     AuditProjector,

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from planning.model.calibration_errors import CalibrationErrors
+from planning.model.devices.calibration_errors import CalibrationErrors
 from planning.model.plan import RigPlan
 from planning.model.words import labelled
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from geometry.arrays import Array
-from planning.model.calibration_errors import CalibrationErrors
+from planning.model.devices.calibration_errors import CalibrationErrors
 from planning.model.plan import RigPlan
 
 from .board import Board, board_poses

@@ -18,8 +18,8 @@ import numpy as np
 
 from geometry.arrays import Array
 from geometry.devices import PinholeModel
-from planning.model.calibration_errors import CalibrationErrors
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.calibration_errors import CalibrationErrors
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 
 Device = PlannedCamera | PlannedProjector
 # Three of the turn [rad], three of the displacement [m], share of the focal length,

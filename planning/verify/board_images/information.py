@@ -13,7 +13,7 @@ import numpy as np
 
 from geometry.arrays import Array, Mask
 from geometry.devices import ParallelModel
-from planning.model.planned import PlannedCamera
+from planning.model.devices.planned import PlannedCamera
 from planning.model.requirements import Requirements
 
 from .device_errors import N_ERRORS, Device, crosses, shifts_of

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from geometry.devices import ParallelModel
-from planning.model.bodies import Body
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.bodies import Body
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.verify.reconstruction.patterns.response import Response
 from planning.verify.reconstruction.patterns.ring_patterns import (
     DrawnRings,

@@ -7,12 +7,12 @@ from typing import Self
 import numpy as np
 
 from geometry.mesh.mesh import TriangleMesh
-from planning.model.bodies import Obstacle
-from planning.model.calibration_errors import CalibrationErrors
+from planning.model.devices.bodies import Obstacle
+from planning.model.devices.calibration_errors import CalibrationErrors
+from planning.model.devices.planned import PlannedProjector
 from planning.model.errors import InputError
 from planning.model.light.light_budget import LightBudget
 from planning.model.plan import RigPlan
-from planning.model.planned import PlannedProjector
 from planning.model.requirements import CheckLimits
 from planning.verify.reconstruction.patterns.response import Response
 from planning.verify.reconstruction.patterns.ring_patterns import Frame

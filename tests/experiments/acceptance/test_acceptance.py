@@ -13,8 +13,8 @@ from geometry.poses import look_at
 from planning.experiments.acceptance.acceptance import Measured, accept
 from planning.experiments.acceptance.artefacts import bars, plates
 from planning.experiments.acceptance.rigs_off import displaced, drawn
-from planning.model.calibration_errors import CalibrationErrors
-from planning.model.planned import PlannedCamera
+from planning.model.devices.calibration_errors import CalibrationErrors
+from planning.model.devices.planned import PlannedCamera
 from planning.verify.reconstruction.calibration import (
     calibrate_camera,
     calibrate_projector,

@@ -9,7 +9,7 @@ from support.exported_plans import FLOOR_M, exported_plan, points_before
 from geometry.poses import inverse, transform
 from planning.handover.export.export_frames import FrameError, frame_of
 from planning.handover.export.exported_rig import ExportedRig
-from planning.model.bodies import Box
+from planning.model.devices.bodies import Box
 
 
 @pytest.fixture(scope="module")

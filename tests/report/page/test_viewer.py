@@ -17,7 +17,7 @@ from support.handmade import tampered, unclaimed
 from support.plain_shapes import box
 
 from geometry.mesh.mesh import TriangleMesh
-from planning.model.bodies import Obstacle
+from planning.model.devices.bodies import Obstacle
 from planning.model.plan import RigPlan
 from planning.report.page.layers import CAUSES
 from planning.report.page.page import write_page

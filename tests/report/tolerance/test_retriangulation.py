@@ -4,7 +4,7 @@ from support.factories import make_camera, make_projector, make_rig
 from support.simulated_rigs import off_by, triangulated
 
 from geometry.poses import inverse, look_at
-from planning.model.device_poses import moved_to
+from planning.model.devices.device_poses import moved_to
 from planning.report.tolerance.retriangulation import retriangulated
 
 _POINTS = np.random.default_rng(5).uniform(-0.05, 0.05, (40, 3))

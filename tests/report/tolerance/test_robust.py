@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom, norm
 
-from planning.model.calibration_errors import Mounting, Robust
+from planning.model.devices.calibration_errors import Mounting, Robust
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.progress import Stopwatch
 from planning.report.partial_plan import PlanRequest

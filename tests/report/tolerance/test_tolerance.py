@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import norm
 from support.little_work import draw_fewer
 
-from planning.model.calibration_errors import (
+from planning.model.devices.calibration_errors import (
     AS_PLANNED,
     PERFECT,
     CalibrationErrors,

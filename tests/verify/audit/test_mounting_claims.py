@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from planning.report.summary.device_lines import mount_lines
+from planning.report.summary.devices.device_lines import mount_lines
 from planning.verify.audit.audit import audit_plan
 
 BODY = {"centre_m": [0.0, 0.0, -0.05], "half_m": [0.03, 0.03, 0.075]}

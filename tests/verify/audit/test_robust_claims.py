@@ -8,8 +8,8 @@ from support.factories import make_camera, make_projector, make_rig
 from support.simulated_rigs import off_by, triangulated
 
 from geometry.poses import inverse, look_at
-from planning.model.calibration_errors import Mounting
-from planning.model.device_poses import moved_to
+from planning.model.devices.calibration_errors import Mounting
+from planning.model.devices.device_poses import moved_to
 from planning.verify.audit.audit_case import examine
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.coverage import robust_claims

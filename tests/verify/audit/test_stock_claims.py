@@ -8,7 +8,7 @@ import pytest
 
 from planning.model.errors import PlanFileError
 from planning.model.plan import RigPlan
-from planning.report.summary.device_lines import used_up
+from planning.report.summary.devices.device_lines import used_up
 from planning.verify.audit.audit import audit_plan
 
 

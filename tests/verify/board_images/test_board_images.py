@@ -9,7 +9,7 @@ from support.simulated_rigs import ONE_EACH, off_by
 
 from geometry.devices import ParallelModel, PinholeModel
 from geometry.poses import inverse, look_at, transform
-from planning.model.planned import PlannedCamera
+from planning.model.devices.planned import PlannedCamera
 from planning.verify.board_images.board import Board, board_poses
 from planning.verify.board_images.chosen_images import plan_images
 from planning.verify.board_images.device_errors import (

@@ -8,7 +8,7 @@ from support.simulated_edges import simulated_edges
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
-from planning.model.calibration_errors import CalibrationErrors
+from planning.model.devices.calibration_errors import CalibrationErrors
 from planning.verify.reconstruction.faults.adjustment import adjust, expected_of
 from planning.verify.reconstruction.faults.bundle import TURN, Bundle
 from planning.verify.reconstruction.faults.supposed import (

@@ -11,7 +11,7 @@ from support.reconstruction_rigs import changed, small_rig
 
 from geometry.mesh.sampling import sample_surface
 from geometry.shapes.primitives import sphere
-from planning.model.calibration_errors import CalibrationErrors
+from planning.model.devices.calibration_errors import CalibrationErrors
 from planning.model.errors import CapturesError, InputError
 from planning.verify.reconstruction.captures.captured import (
     reconstruct_captured,

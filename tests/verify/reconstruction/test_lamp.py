@@ -11,8 +11,9 @@ from geometry.mesh.sampling import sample_surface
 from geometry.rays.rays import RayCaster
 from planning.model.light.drawn_edges import DrawnEdges
 from planning.model.requirements import CameraLimits, TriangulationLimits
-from planning.scene import lighting, measurability
+from planning.scene import lighting
 from planning.scene.codes.patterns import pattern_of
+from planning.scene.measuring import measurability
 from planning.scene.samples import Target
 from planning.verify.reconstruction.calibration import PairCalibration
 from planning.verify.reconstruction.decode.edges import find_edges

@@ -7,7 +7,7 @@ from support import reconstruction_rigs as rigs
 
 from geometry.files.readers import load_mesh
 from geometry.shapes.primitives import sphere
-from planning.model.bodies import Body
+from planning.model.devices.bodies import Body
 from planning.model.errors import InputError
 from planning.verify.reconstruction.patterns.defocus import Defocus
 from planning.verify.reconstruction.reconstruct import reconstruct

@@ -8,7 +8,7 @@ from scipy.spatial import KDTree
 from support import reconstruction_rigs as rigs
 
 from geometry.mesh.mesh import TriangleMesh
-from planning.model.calibration_errors import CalibrationErrors
+from planning.model.devices.calibration_errors import CalibrationErrors
 from planning.verify.reconstruction.check.calibration_sigma import (
     _SHARE,
     _deviations,

@@ -20,7 +20,7 @@ from planning.proofs.quotas import Quotas, RegionFloors
 from planning.proofs.selection import cover_problem
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.measured import LitSamples, measured_by
+from planning.scene.measuring.measured import LitSamples, measured_by
 from planning.scene.samples import Target, merged
 from planning.scene.scene import Scene
 from solvers import CoverProblem, CoverSolution, solve_cover

@@ -10,9 +10,9 @@ import numpy as np
 
 from geometry.arrays import Array
 from geometry.devices import PinholeModel
-from planning.model.device_poses import moved_to
-from planning.model.heads import Head, HeadDevice
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.device_poses import moved_to
+from planning.model.devices.heads import Head, HeadDevice
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Workspace
 from planning.scene.placed_bodies import Device
 from planning.scene.scene import Scene

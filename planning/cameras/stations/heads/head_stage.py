@@ -7,8 +7,8 @@ import numpy as np
 
 from planning.cameras.camera_cover import CameraCover, candidate_cover
 from planning.cameras.proved_cameras import CameraStage
+from planning.model.devices.planned import PlannedProjector
 from planning.model.document.certificates import NeededCount
-from planning.model.planned import PlannedProjector
 from planning.projectors.candidate_set import CandidateSet
 from planning.projectors.projector_stage import ProjectorStage
 from planning.proofs.all_poses import BoundQuestion, Effort
@@ -16,11 +16,11 @@ from planning.proofs.candidate_certificate import unproved, unsought
 from planning.proofs.projector_bound import bound_projectors
 from planning.proofs.quotas import RegionFloors
 from planning.proofs.selection import fewest_count
-from planning.scene.camera_views import CandidateViews
 from planning.scene.draws import DRAWS
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.measured import LitSamples, measured_by
+from planning.scene.measuring.camera_views import CandidateViews
+from planning.scene.measuring.measured import LitSamples, measured_by
 from planning.scene.scene import Scene
 
 from .head_poses import PlacedHead

@@ -12,8 +12,8 @@ import numpy as np
 from geometry.arrays import Array
 from geometry.devices import PinholeModel
 from geometry.shapes.boxes import box_gap, boxes_overlap
-from planning.model.bodies import Body
-from planning.model.planned import PlannedCamera
+from planning.model.devices.bodies import Body
+from planning.model.devices.planned import PlannedCamera
 from planning.scene.bodies.clearance import lacks_clearance
 from planning.scene.placed_bodies import CLEARANCE_M, placed_box
 from planning.scene.scene import Scene

@@ -12,10 +12,10 @@ from typing import TypeVar
 import numpy as np
 
 from geometry.arrays import Array, Ints, Mask
-from planning.model.device_poses import moved_to
+from planning.model.devices.device_poses import moved_to
+from planning.model.devices.heads import Turntable
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.heads import Turntable
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Workspace
 from planning.scene.placed_bodies import Device
 from planning.scene.workspace.admissible import admissible

@@ -8,10 +8,10 @@ import numpy as np
 
 from geometry.arrays import Ints, Mask
 from planning.cameras.stations.heads.head_cover import HeadSets
-from planning.scene.camera_views import camera_views
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.measured import LitSamples, measured_by
+from planning.scene.measuring.camera_views import camera_views
+from planning.scene.measuring.measured import LitSamples, measured_by
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 

@@ -19,8 +19,8 @@ from geometry.shapes.swept import (
     lowest,
     spacing_m,
 )
+from planning.model.devices.heads import Turntable
 from planning.model.errors import InfeasibleLimitsError
-from planning.model.heads import Turntable
 from planning.model.requirements import Workspace
 from planning.scene.placed_bodies import Obstruction
 from planning.scene.scene import Scene

@@ -9,7 +9,7 @@ from geometry.arrays import Array
 from geometry.poses import horizontal_axes
 from planning.handover.export.exported_rig import BOX_QUADS, Content, ExportedRig
 from planning.handover.export.mount_tables import reference_point
-from planning.report.summary.device_lines import axis_name
+from planning.report.summary.devices.device_lines import axis_name
 
 from .dxf_text import DxfText
 

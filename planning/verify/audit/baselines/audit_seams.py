@@ -9,8 +9,8 @@ from scipy.optimize import root_scalar
 
 from geometry.arrays import Array, Mask
 from geometry.mesh.mesh import TriangleMesh
+from planning.model.devices.planned import PlannedCamera
 from planning.model.document.device_records import BaselineRow
-from planning.model.planned import PlannedCamera
 from planning.verify.audit.predicates.audit_optics import dot, in_image, pixels_of
 
 _STEPS = 2000

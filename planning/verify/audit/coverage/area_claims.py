@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from geometry.arrays import Array, Ints, Mask
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.estimates import ROUNDING

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from geometry.arrays import Array, Mask
-from planning.model.calibration_errors import Robust
+from planning.model.devices.calibration_errors import Robust
 from planning.model.document.coverage_records import RobustRecord
 from planning.model.plan import RigPlan
 from planning.verify.audit.audit_case import AuditCase

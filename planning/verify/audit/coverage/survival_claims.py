@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from geometry.arrays import Ints, Mask
-from planning.model.calibration_errors import Survival
+from planning.model.devices.calibration_errors import Survival
 from planning.model.document.survival_records import (
     LossRecord,
     SurvivalRecord,

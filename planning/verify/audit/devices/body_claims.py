@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from planning.model.bodies import Body
+from planning.model.devices.bodies import Body
 from planning.model.requirements import Workspace
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings

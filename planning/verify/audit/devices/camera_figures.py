@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from geometry.arrays import Array, Ints
+from planning.model.devices.planned import PlannedCamera
 from planning.model.plan import RigPlan
-from planning.model.planned import PlannedCamera
 from planning.verify.audit.audit_samples import AuditSamples, draw_samples
 from planning.verify.audit.predicates.audit_devices import audit_projectors
 from planning.verify.audit.predicates.audit_optics import (

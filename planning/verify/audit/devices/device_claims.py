@@ -7,12 +7,12 @@ import numpy as np
 
 from geometry.arrays import Array
 from geometry.devices import PinholeModel
-from planning.model.bodies import Existing
+from planning.model.devices.bodies import Existing
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.document.device_records import CameraRecord, ProjectorRecord
 from planning.model.document.input_records import RigRecord
 from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Workspace
 from planning.verify.audit.audit_case import AuditCase, DeviceKind
 from planning.verify.audit.audit_findings import AuditFindings

@@ -8,7 +8,7 @@ import numpy as np
 
 from geometry.arrays import Array
 from geometry.devices import PinholeModel
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.requirements import Workspace
 from planning.verify.audit.audit_case import AuditCase, DeviceKind
 from planning.verify.audit.audit_findings import AuditFindings

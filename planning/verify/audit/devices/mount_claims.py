@@ -3,7 +3,7 @@
 import numpy as np
 
 from geometry.arrays import Array
-from planning.model.bodies import Mount
+from planning.model.devices.bodies import Mount
 from planning.model.plan import RigPlan
 from planning.verify.audit.audit_case import AuditCase, DeviceKind
 from planning.verify.audit.audit_findings import AuditFindings

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from geometry.arrays import Array
-from planning.model.bodies import Obstacle
+from planning.model.devices.bodies import Obstacle
 from planning.model.document.input_records import ObstacleRecord
 from planning.model.errors import PlanFileError
 from planning.model.plan import RigPlan

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from geometry.arrays import Array
-from planning.model.bodies import Box
+from planning.model.devices.bodies import Box
 from planning.model.plan import RigPlan
 from planning.model.requirements import Workspace
 from planning.verify.audit.audit_case import AuditCase

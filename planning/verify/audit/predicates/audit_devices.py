@@ -10,9 +10,9 @@ import numpy as np
 
 from geometry.arrays import Array, Mask
 from geometry.devices import ParallelModel, PinholeModel
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.light.dense_code import DenseCode
 from planning.model.plan import RigPlan
-from planning.model.planned import PlannedCamera, PlannedProjector
 
 from .audit_optics import (
     in_frame,

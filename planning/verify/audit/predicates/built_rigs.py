@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from geometry.arrays import Array
 from geometry.devices import PinholeModel
-from planning.model.calibration_errors import PERFECT, Mounting
+from planning.model.devices.calibration_errors import PERFECT, Mounting
 from planning.model.document.device_records import CameraRecord, ProjectorRecord
 from planning.model.plan import RigPlan
 

@@ -16,9 +16,9 @@ from scipy.optimize import lsq_linear
 from geometry.arrays import Array, Ints, Mask
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
-from planning.model.bodies import Box, Obstacle
+from planning.model.devices.bodies import Box, Obstacle
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.plan import RigPlan
-from planning.model.planned import PlannedCamera, PlannedProjector
 
 _Device = PlannedProjector | PlannedCamera
 # Positions are written to 0.01 mm, so bodies in contact may overlap by as much.

@@ -5,7 +5,7 @@ It is an inference from images and calibration alone: "as if", not "is".
 
 from dataclasses import dataclass
 
-from planning.model.calibration_errors import CalibrationErrors
+from planning.model.devices.calibration_errors import CalibrationErrors
 from planning.verify.reconstruction.scanner import Scanner
 
 from .adjustment import Adjusted, adjust, expected_of

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from planning.model.calibration_errors import CalibrationErrors
+from planning.model.devices.calibration_errors import CalibrationErrors
 from planning.verify.reconstruction.calibration import ProjectorCalibration
 from planning.verify.reconstruction.check.refined_rig import Moved, RefinedRig
 from planning.verify.reconstruction.decode.decode import Decoded, Pairs, measure_edges

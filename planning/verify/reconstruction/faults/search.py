@@ -8,7 +8,7 @@ is chosen; of what edges can't tell apart all is kept.
 
 import numpy as np
 
-from planning.model.calibration_errors import CalibrationErrors
+from planning.model.devices.calibration_errors import CalibrationErrors
 from planning.verify.reconstruction.arrays import Array
 
 from .adjustment import Adjusted, adjust, expected_of

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.arrays import lengths
-from planning.model.planned import code_bits
+from planning.model.devices.planned import code_bits
 from planning.verify.reconstruction.arrays import Array, Grey, Images, Indices, Mask
 from planning.verify.reconstruction.light_laws import LightLaw
 

@@ -17,7 +17,7 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import look_at
 from geometry.shapes.primitives import box, sphere
 from geometry.shapes.sample_head.sample_head import sample_head
-from planning.model.calibration_errors import CalibrationErrors
+from planning.model.devices.calibration_errors import CalibrationErrors
 from planning.model.requirements import ProjectorLimits, Workspace
 from planning.verify.audit.audit_samples import AuditSamples, samples_on
 from planning.verify.audit.predicates.audit_devices import (

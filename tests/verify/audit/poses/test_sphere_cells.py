@@ -7,7 +7,7 @@ import pytest
 from support.factories import make_workspace
 
 from geometry.arrays import Array
-from planning.model.bodies import Box
+from planning.model.devices.bodies import Box
 from planning.model.requirements import Workspace
 from planning.verify.audit.devices.workspace_claims import outside_by
 from planning.verify.audit.proofs.poses.admissible_cells import may_stand

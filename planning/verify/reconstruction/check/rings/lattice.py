@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planning.model.planned import EDGE_VARIANCE, edge_linearity_px
+from planning.model.devices.planned import EDGE_VARIANCE, edge_linearity_px
 from planning.verify.reconstruction.arrays import Array
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.scanner import Scanner

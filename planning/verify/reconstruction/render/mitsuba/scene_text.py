@@ -19,7 +19,7 @@ from typing import Self
 
 import numpy as np
 
-from planning.model.bodies import Body
+from planning.model.devices.bodies import Body
 from planning.model.errors import InputError
 from planning.verify.reconstruction.arrays import Array
 from planning.verify.reconstruction.calibration import (

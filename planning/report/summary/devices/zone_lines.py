@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from planning.model.bodies import Box
+from planning.model.devices.bodies import Box
 from planning.model.plan import RigPlan
 from planning.model.requirements import Workspace
 from planning.model.words import labelled

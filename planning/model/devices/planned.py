@@ -7,9 +7,9 @@ import numpy as np
 
 from geometry.arrays import Array
 from geometry.devices import ParallelModel, PinholeModel
+from planning.model.light.dense_code import DenseCode
 
 from .bodies import Body
-from .light.dense_code import DenseCode
 
 
 @dataclass(frozen=True, eq=False)

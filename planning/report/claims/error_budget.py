@@ -3,10 +3,10 @@
 import numpy as np
 
 from planning.model.document.coverage_records import PredictedSigma
-from planning.scene.camera_views import view_of
 from planning.scene.limits.pair_quality import NOISE_TERMS
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.measured import LitSamples, pairs_of
+from planning.scene.measuring.camera_views import view_of
+from planning.scene.measuring.measured import LitSamples, pairs_of
 from planning.scene.scene import Scene
 
 from .judged import Devices, Judged

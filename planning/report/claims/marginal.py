@@ -7,12 +7,12 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.document.coverage_records import CameraMarginal, ProjectorMarginal
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.scene.draws import DRAWS
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.measured import lit_samples, measured_by
+from planning.scene.measuring.measured import lit_samples, measured_by
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.cache.content import content
-from planning.model.planned import PlannedCamera
+from planning.model.devices.planned import PlannedCamera
 from planning.scene.limits.camera_limits import ViewedSamples
+from planning.scene.placed_bodies import blocked_by
+from planning.scene.samples import Target
+from planning.scene.scene import Scene
 from solvers.bit_rows import pack_rows, unpack_rows
 
 from . import measurability
-from .placed_bodies import blocked_by
-from .samples import Target
-from .scene import Scene
 
 # Of a cosine: what this decides roughly, `measurability.view` decides exactly.
 _ROUNDING = 1e-9

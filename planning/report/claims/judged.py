@@ -6,12 +6,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.scene.lighting import lit_stages
 from planning.scene.limits import pair_limits, projector_limits
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.limits.view_pair_limits import VIEW_CAUSES
-from planning.scene.measured import LitSamples, furthest_failure, measured_by
+from planning.scene.measuring.measured import LitSamples, furthest_failure, measured_by
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 

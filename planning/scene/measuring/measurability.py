@@ -22,7 +22,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.planned import PlannedCamera
+from planning.model.devices.planned import PlannedCamera
 from planning.model.requirements import CameraLimits, TriangulationLimits
 from planning.scene.codes.surfaces import Coded, CodedPixels, PixelSurfaces
 from planning.scene.limits.calibration_terms import ray_deviation, surface_deviation
@@ -39,10 +39,9 @@ from planning.scene.limits.code_noise import code_noise, least_phase_px, togethe
 from planning.scene.limits.limit import first_violated
 from planning.scene.limits.pair_limits import PAIR_LIMITS
 from planning.scene.limits.pair_quality import PairQuality, Term
-
-from .occlusion import Occlusion
-from .placed_bodies import Blocker, first_blocked
-from .samples import LightOnSamples, Target
+from planning.scene.occlusion import Occlusion
+from planning.scene.placed_bodies import Blocker, first_blocked
+from planning.scene.samples import LightOnSamples, Target
 
 
 def view(

@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.rays.rays import equal_parts
-from planning.model.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.scene import lighting
 from planning.scene.limits.projector_limits import INCIDENCE, LIT
-from planning.scene.measured import LitSamples, measured_by, taken
+from planning.scene.measuring.measured import LitSamples, measured_by, taken
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 

@@ -17,20 +17,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.arrays import rows_of
-from planning.model.planned import PlannedCamera, PlannedProjector, meet
+from planning.model.devices.planned import PlannedCamera, PlannedProjector, meet
 from planning.model.requirements import TriangulationLimits
 from planning.scene.codes.patterns import panel_light, pattern_of
 from planning.scene.codes.surfaces import Coded
+from planning.scene.lighting import light_on, lit_stages
 from planning.scene.limits.camera_limits import ViewedSamples
 from planning.scene.limits.pair_limits import MEASURED
 from planning.scene.limits.pair_quality import PairQuality
 from planning.scene.limits.projector_limits import LIT
+from planning.scene.samples import LightOnSamples, Target
+from planning.scene.scene import Scene
 
 from .camera_views import CameraView, camera_views, view_of
-from .lighting import light_on, lit_stages
 from .measurability import first_pair_failure, pair_quality
-from .samples import LightOnSamples, Target
-from .scene import Scene
 
 # Seen by several cameras and worked on together: many calls on few samples are slow,
 # and much more leaves the cache.

@@ -13,8 +13,7 @@ from pydantic import Field, model_validator
 
 from geometry.arrays import Array
 from geometry.mesh.mesh import TriangleMesh
-
-from .table_types import Axis, Positive, Sides, Table
+from planning.model.table_types import Axis, Positive, Sides, Table
 
 # How far from a whole number the steps of a turn may be.
 _WHOLE = 1e-6

@@ -7,10 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.repair.hollow import lies_inside
+from planning.model.devices.planned import PlannedProjector
 from planning.model.document.coverage_records import Areas, Coverage
-from planning.model.planned import PlannedProjector
 from planning.rings.ring_pitch import widest_gap
-from planning.scene.camera_views import view_of
 from planning.scene.draws import DRAWS
 from planning.scene.lighting import (
     assigned_projectors,
@@ -19,7 +18,8 @@ from planning.scene.lighting import (
 )
 from planning.scene.limits import camera_limits, projector_limits
 from planning.scene.limits.projector_limits import LIT
-from planning.scene.measured import widest_pixel
+from planning.scene.measuring.camera_views import view_of
+from planning.scene.measuring.measured import widest_pixel
 from planning.scene.placed_bodies import Blocker, Device, Obstruction, blocked_by
 from planning.scene.samples import Target
 from planning.scene.scene import Scene

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from geometry.devices import turned_to
 from geometry.poses import horizontal_axes, pan_tilt_roll
 from geometry.shapes.boxes import box_gap
+from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
-from planning.model.planned import PlannedCamera, PlannedProjector
 from planning.model.words import count_words
 from planning.scene.placed_bodies import bodies_of
 

@@ -22,10 +22,9 @@ from planning.model.words import count_words
 from planning.proofs import projector_bound
 from planning.report.assemble import Draft
 from planning.report.partial_plan import PartialPlan, PlanRequest, Prepared
-
-from .best_kept import Search
-from .prepare import prepared
-from .stages import short_of
+from planning.steps.best_kept import Search
+from planning.steps.prepare import prepared
+from planning.steps.stages import short_of
 
 
 def heads_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan, Draft]:

@@ -23,7 +23,7 @@ from planning.cameras.stations.turntable.table_lattice import (
 )
 from planning.cameras.stations.turntable.table_room import TableRoom, room_of
 from planning.cameras.stations.turntable.table_sets import TableSets
-from planning.model.device_poses import moved_to
+from planning.model.devices.device_poses import moved_to
 from planning.model.document.station_records import (
     Placement,
     StationCount,
@@ -39,10 +39,9 @@ from planning.report.partial_plan import PartialPlan, PlanRequest, Prepared
 from planning.scene.draws import DRAWS
 from planning.scene.placed_bodies import Obstruction
 from planning.scene.scene import Scene
-
-from .best_kept import Search
-from .prepare import prepared
-from .stages import short_of
+from planning.steps.best_kept import Search
+from planning.steps.prepare import prepared
+from planning.steps.stages import short_of
 
 # Numbers of either device that steps are looked for, at most.
 _MOST_LAMPS, _MOST_EYES = 2, 3

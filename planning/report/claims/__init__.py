@@ -1,0 +1,1 @@
+"""Areas and figures that a plan claims, recomputed on fresh samples."""

@@ -1,0 +1,1 @@
+"""Devices, stations and zones as lines for who mounts them."""

@@ -1,0 +1,1 @@
+"""What cameras see, and what they measure with the projectors that light it."""

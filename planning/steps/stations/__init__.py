@@ -1,0 +1,1 @@
+"""Plans of devices that stand together, or before a turntable."""
