@@ -1,6 +1,7 @@
 """What travels with a plan so that others can derive its bounds."""
 
 from collections.abc import Iterable
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -155,15 +156,21 @@ def _frozen(
 
     A cover of cameras has those that are lit. None where they are of other draws.
     """
+    own = set(map(bytes, samples.samples.points))
     for draws in tried:
-        drawn = [(scene.target_samples(d), every) for d, every in draws]
-        points = np.concatenate([t.samples.points[::every] for t, every in drawn])
-        place = {point: i for i, point in enumerate(map(bytes, points))}
+        drawn = [(d, every, scene.target_samples(d).samples) for d, every in draws]
+        # One that confirmed, before floors were asked for, has joined nothing.
+        drawn = [
+            (d, every, s.points[::every], s.faces[::every])
+            for d, every, s in drawn
+            if not own.isdisjoint(map(bytes, s.points[::every]))
+        ]
+        place = {bytes(p): i for i, p in enumerate(chain(*(s[2] for s in drawn)))}
         where = [place.get(bytes(point)) for point in samples.samples.points]
         known = [i for i in where if i is not None]
-        if len(known) == len(where):
-            faces = np.concatenate([t.samples.faces[::every] for t, every in drawn])
-            told = np.array([(d.count, d.stream, every) for d, every in draws])
+        if drawn and len(known) == len(where):
+            told = np.array([(d.count, d.stream, every) for d, every, *_ in drawn])
+            points, faces = (np.concatenate([s[k] for s in drawn]) for k in (2, 3))
             return told, points, faces, np.array(known, dtype=np.int64)
     return None
 
