@@ -4,6 +4,7 @@ The claims are the planner's; the audit shares no code with it.
 """
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from planning.verify.audit.audit import audit_plan
 from planning.verify.audit.audit_case import examine
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.predicates.audit_devices import AuditProjector
-from planning.verify.audit.rings.axis_claims import audit_ring_axes
+from planning.verify.audit.rings.axis_claims import audit_centred, audit_ring_axes
 from planning.verify.audit.rings.ring_claims import audit_rings
 
 LIGHTS = ["diverging", "parallel"]
@@ -218,6 +219,27 @@ def test_false_claims_about_ring_axes_are_named(drum):
     assert found.startswith("ring_axes.other.measured_m2: claimed")
     (found,) = told(other=other | {"projectors": same[::-1]})
     assert str(ids[::-1]) in found
+
+
+@pytest.mark.parametrize(
+    ("n_lit", "n_far", "n_false"), [(500, 10, 0), (500, 11, 1), (9, 9, 0)]
+)
+def test_few_samples_far_out_dont_make_an_axis_stand_aside(n_lit, n_far, n_false):
+    """Another draw may have missed them; of so few no ring is told at all."""
+    coordinates = np.where(np.arange(n_lit) < n_far, 1.2, 0.9)
+    light = SimpleNamespace(narrowest_ring=lambda _: 1.0)
+    record = SimpleNamespace(id="P1", rings=None)
+    case = SimpleNamespace(
+        plan=SimpleNamespace(document=SimpleNamespace(projectors=[record])),
+        projectors=[
+            SimpleNamespace(light=light, ring_coordinate=lambda _: coordinates)
+        ],
+        samples=SimpleNamespace(points=np.zeros((n_lit, 3))),
+        actual=SimpleNamespace(lit_by=np.ones((1, n_lit), dtype=bool)),
+    )
+    findings = AuditFindings()
+    audit_centred((case,), findings)
+    assert len(findings.failures) == n_false
 
 
 def test_a_run_that_was_cut_needs_no_report_on_rings(drum):
