@@ -170,7 +170,8 @@ def _frozen(
         known = [i for i in where if i is not None]
         if drawn and len(known) == len(where):
             told = np.array([(d.count, d.stream, every) for d, every, *_ in drawn])
-            points, faces = (np.concatenate([s[k] for s in drawn]) for k in (2, 3))
+            points = np.concatenate([points for *_, points, _ in drawn])
+            faces = np.concatenate([faces for *_, faces in drawn])
             return told, points, faces, np.array(known, dtype=np.int64)
     return None
 
