@@ -66,6 +66,10 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         folder = asked.plan or _made(Path(name))
         judge = Judge(RigPlan.load(folder / "plan.json"))
+        # A judge who finds fault with the plan as made finds every edit, too.
+        unedited = judge.judged(judge.document, "projectors")
+        if unedited != "passed":
+            raise SystemExit(f"the plan as made is {unedited}")
         kinds: dict[str, list[tuple[KeyPath, Any]]] = defaultdict(list)
         for path, value in leaves(judge.document):
             kinds[_kind(path)].append((path, value))

@@ -21,6 +21,8 @@ from planning.verify.audit.figure_claims import contradictions
 from planning.verify.audit.request_claims import audit_request
 from planning.verify.held_figures import EXACTLY, WHOLLY, hold_claims, hold_figures
 from planning.verify.no_claims import NO_CLAIM, is_under
+from planning.verify.reconstruction.render.photometry import assumed_light
+from planning.verify.reconstruction.scanner import Scanner
 from planning.verify.trust import is_trusted
 from planning.verify.verification import verify_plan
 
@@ -102,9 +104,10 @@ class Judge:
 
     def _false(self, plan: RigPlan, section: str, *, quick: bool) -> Iterator[object]:
         """Yield what of a plan is false, check by check."""
-        document, limits = plan.document, plan.requirements.check
+        document = plan.document
         yield document.reconstruction is None
-        yield contradictions(document.reconstruction, limits, plan.digest)
+        room = assumed_light(Scanner.of(plan)).ambient
+        yield contradictions(document.reconstruction, room, plan.digest)
         fresh, seed = self._fresh, document.seed
         if section not in _RENDERED:
             yield hold_figures(plan, fresh, seed)[0]

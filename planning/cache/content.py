@@ -19,7 +19,7 @@ from planning.model.installed import sources_hash, versions
 _Update = Callable[[bytes | memoryview], None]
 
 # Rooms of `planning` that no remembered function reaches, by the layers of the house.
-_ABOVE = ("cli", "experiments", "handover", "report", "verify")
+_ABOVE = ("cli", "experiments", "handover", "verify")
 # Values that are asked for again and again, and never change.
 _VALUES = TriangleMesh, PlannedProjector, PlannedCamera
 _known: WeakKeyDictionary[object, str] = WeakKeyDictionary()

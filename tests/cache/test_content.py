@@ -1,6 +1,7 @@
 """Keys: what changes an answer changes them, and nothing else does."""
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from support.factories import make_requirements, make_rig, make_scene
 
 from geometry.mesh.mesh import MeshSource, TriangleMesh
 from geometry.shapes.primitives import sphere
+from planning.cache import content as contents
 from planning.cache.content import content
 from planning.model.requirements import CheckLimits
 
@@ -77,3 +79,11 @@ def test_a_scene_is_all_that_answers_hang_on_and_projectors_know_less():
     tighter = replace(required.triangulation, max_sigma_m=1e-6)
     exact = asking(triangulation=tighter)
     assert content(exact.for_light) == content(scene.for_light)
+
+
+def test_the_code_of_every_room_that_keeps_answers_counts():
+    rooms = Path(contents.__file__).parents[1]
+    files = [file for file in rooms.rglob("*.py") if ".recall(" in file.read_text()]
+    kept = {file.relative_to(rooms).parts[0] for file in files}
+    assert {"report", "steps"} <= kept
+    assert kept.isdisjoint(contents._ABOVE)

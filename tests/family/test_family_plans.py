@@ -15,6 +15,9 @@ from planning.cli.main import commands
 from planning.cli.output_folder import exchanged
 from planning.model.errors import InputError, PlanFileError
 from planning.steps.family.family_plan import family_plan, met
+from planning.verify.audit.audit import audit_plan
+from planning.verify.audit.audit_case import examine
+from planning.verify.family import audit_family
 
 # Options of the command line that aren't given.
 _NOTHING = dict.fromkeys(
@@ -191,6 +194,21 @@ def _moved(plan):
     return RigPlan(plan.document, plan.surface, (moved, *others))
 
 
+def _with_a_ring_left_out(plan):
+    """A ring that lights the surface is called idle, in all members alike."""
+
+    def without(document):
+        first, *others = document.projectors
+        radii = list(first.ring_radii)
+        gone = radii.pop(len(radii) // 2)
+        rings = first.rings.changed(left_out=(gone,))
+        changed = first.changed(ring_radii=tuple(radii), rings=rings)
+        return document.changed(projectors=(changed, *others))
+
+    members = tuple(RigPlan(without(m.document), m.surface) for m in plan.members)
+    return RigPlan(without(plan.document), plan.surface, members)
+
+
 def _better(plan):
     first, *others = plan.document.members
     areas = first.coverage.target.changed(lit_m2=2.0 * first.coverage.target.area_m2)
@@ -220,6 +238,20 @@ FALSE = {
     "another rig for one": (_moved, "projectors differ"),
     "better than it says itself": (_better, "members.0.coverage"),
 }
+
+
+def test_a_ring_that_lights_a_served_member_is_not_idle(both):
+    """It may light one that needn't be served."""
+    forged = _with_a_ring_left_out(both)
+    cases = [examine(m, seed=0, threads=1, n_samples=1000) for m in forged.members]
+    lit = [bool(case.actual.lit_by[0].any()) for case in cases]
+    (one,) = np.flatnonzero(lit)
+    words = f"members.{one}.P1.rings.left_out: 1 rings light"
+    assert any(words in line for line in audit_family(forged, cases))
+    aside = _with_family(forged, left_out=(int(one),), worst=1 - int(one))
+    mine = f"members.{one}.P1.rings.left_out"
+    assert not any(mine in line for line in audit_family(aside, cases))
+    assert not any("left_out: 1" in m for m in audit_plan(forged.members[one]).failures)
 
 
 @pytest.mark.parametrize("name", FALSE)

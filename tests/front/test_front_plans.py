@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from geometry.shapes.primitives import sphere
 from geometry.shapes.sample_head.sample_head import sample_head
 from planning import load_rig
 from planning.cameras import camera_cover
@@ -17,6 +18,7 @@ from planning.report.entries.device_entries import rounded_camera, rounded_proje
 from planning.rig.wishes import Wishes
 from planning.scene.draws import DRAWS
 from planning.scene.measuring.measured import lit_samples, measured_by
+from planning.scene.placed_bodies import Obstruction
 from planning.steps.asked.request import request_of
 from planning.steps.front import front_matrix
 from planning.steps.front import plan_front as fronts
@@ -168,7 +170,11 @@ def test_a_changed_mesh_rig_seed_or_requirement_is_refused_by_name(folder, mesh,
     front = read_front(folder)
     moved = replace_vertices(mesh)
     other = rig.replace(placement={"n_candidate_projectors": 31})
+    ready = ready_for(mesh, rig)
+    arm = Obstruction("arm", sphere(0.05, subdivisions=1), 1e-4)
+    among = replace(ready, scene=replace(ready.scene, obstructions=(arm,)))
     for words, ready in (
+        ("another set of obstacles:", among),
         ("another mesh:", ready_for(moved, rig)),
         ("another rig:", ready_for(mesh, other)),
         ("another seed:", ready_for(mesh, rig, seed=1)),
@@ -197,11 +203,23 @@ def test_damaged_files_are_refused_in_one_line(folder, tmp_path):
         read_front(tmp_path)
     middle = len(whole) // 2
     flipped = whole[:middle] + bytes([whole[middle] ^ 255]) + whole[middle + 1 :]
-    for broken in (b"", b"no zip", whole[:middle], flipped):
+    later, entry = bytearray(whole), whole.rindex(b"PK\x01\x02")
+    later[entry + 6] = 143
+    for broken in (b"", b"no zip", whole[:middle], flipped, bytes(later)):
         path.write_bytes(broken)
         with pytest.raises(PlanFileError, match="no front, or a damaged one") as caught:
             read_front(tmp_path)
         assert "\n" not in str(caught.value)
+    with np.load(folder / FRONT_FILE) as file:
+        arrays = dict(file)
+    for name, value in (
+        ("projector_poses", arrays["projector_poses"][1:]),
+        ("camera_poses", np.full_like(arrays["camera_poses"], np.nan)),
+        ("camera_models", arrays["camera_models"] - 1),
+    ):
+        np.savez(path, **(arrays | {name: value}))
+        with pytest.raises(PlanFileError, match="don't fit together"):
+            read_front(tmp_path)
     np.savez(path, head=np.array('{"format": "other"}'))
     with pytest.raises(PlanFileError, match="damaged"):
         read_front(tmp_path)

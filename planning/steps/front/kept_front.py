@@ -7,6 +7,7 @@ import zlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -31,7 +32,10 @@ _ARRAYS = (
     *("stages", "seen", "projector_poses", "projector_rings", "projector_models"),
     *("camera_poses", "camera_models", "point_rings"),
 )
-_DAMAGED = (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error)
+_DAMAGED = (
+    *(ValueError, KeyError, TypeError, EOFError, NotImplementedError, TokenError),
+    *(zipfile.BadZipFile, zlib.error),
+)
 _AGAIN = "make the front again with --pareto"
 
 
@@ -161,6 +165,7 @@ def read_front(folder: Path) -> KeptFront:
             with path.open("rb") as opened, np.load(opened) as file:
                 head = json.loads(str(file["head"]))
                 arrays = {name: file[name] for name in _ARRAYS}
+            _hold_together(arrays)
             known = head["format"], head["version"]
             kept = KeptFront(Front(**head["front"]), dict(head["digests"]), arrays)
         except _DAMAGED as error:
@@ -176,6 +181,25 @@ def read_front(folder: Path) -> KeptFront:
     return kept
 
 
+def _hold_together(arrays: dict[str, NDArray[Any]]) -> None:
+    """Raise ValueError unless candidates have a pose, a model and a column each."""
+    poses = {name: arrays[f"{name}_poses"] for name in ("projector", "camera")}
+    frames = *poses.values(), arrays["projector_rings"], arrays["point_rings"]
+    models = [arrays[f"{name}_models"] for name in poses]
+    if not (
+        all(a.ndim == 3 and a.shape[1:] == (4, 4) for a in frames)
+        and all(np.isfinite(a).all() for a in frames)
+        and all(len(m) == len(p) for m, p in zip(models, poses.values(), strict=True))
+        and all(m.ndim == 1 and m.dtype.kind == "i" for m in models)
+        and all(m.min(initial=0) >= 0 for m in models)
+        and len(arrays["projector_rings"]) == len(poses["projector"])
+        and all(arrays[name].ndim == 2 for name in ("stages", "seen"))
+        and arrays["stages"].shape[1] >= len(poses["projector"])
+        and arrays["seen"].shape[1] >= len(poses["camera"])
+    ):
+        raise ValueError("its arrays don't fit together")
+
+
 def digests_of(ready: Prepared) -> dict[str, str]:
     """Return a digest of each thing that a matrix depends on, causes first.
 
@@ -187,11 +211,15 @@ def digests_of(ready: Prepared) -> dict[str, str]:
     axis = replace(request, axis_wanted=None).ring_axis
     for name in ("max_projectors", "max_cameras"):
         del asked[name]
+    # Of obstacles the rig has names and places, and their files the rest.
+    meshes = [one.mesh for one in scene.obstructions]
+    obstacles = [part for mesh in meshes for part in (mesh.vertices, mesh.faces)]
     return {
         "mesh": _digest(scene.mesh.vertices, scene.mesh.faces),
         "rig": _digest(request.rig.to_document()),
         "seed": _digest(request.seed),
         "target": _digest(scene.region, scene.steep),
+        "set of obstacles": _digest(*obstacles),
         "set of requirements": _digest(asked | {"ring_axis": axis}),
     }
 

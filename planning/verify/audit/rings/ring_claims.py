@@ -103,10 +103,10 @@ def _audit_spacing(
         f"the {len(every)} ring_radii aren't {count} at equal steps, but 'uniform' is "
         f"claimed",
     )
-    rows = np.arange(1, ROWS * len(even) + 1) * (even[0] / ROWS)
-    grid = cast_rings(case, projector, rows)
+    grid = cast_rings(case, projector, _rows(even))
     _audit_gaps(rings, even, grid, findings)
-    if "left_out" in rings.model_fields_set:
+    # Those of a family may light another member, or one that needn't be served.
+    if "left_out" in rings.model_fields_set and not case.plan.of_member:
         _audit_idle(every, np.array(rings.left_out), grid, case, findings)
     limits = case.plan.requirements
     sigma = limits.triangulation.max_sigma_m
@@ -118,6 +118,26 @@ def _audit_spacing(
     slack = max(_STRAY_SLACK, _STRAY_CHORDS / max(n_chords, 1))
     findings.numbers(rings, truth, slack, "of the chords")
     audit_creases(rings.creases, case, projector, creases, findings.at("creases"))
+
+
+def audit_left_out(case: AuditCase, findings: AuditFindings) -> None:
+    """Check that rings which a family leaves out light nothing of a member served."""
+    records = case.plan.document.projectors
+    for record, projector in zip(records, case.projectors, strict=True):
+        rings = record.rings
+        if rings is None or not rings.left_out:
+            continue
+        left_out = np.array(rings.left_out)
+        every = np.sort(np.concatenate([projector.radii, left_out]))
+        even = float(every[-1]) * np.arange(1, rings.n_even + 1) / rings.n_even
+        grid = cast_rings(case, projector, _rows(even))
+        below = findings.at(f"{record.id}.rings")
+        _audit_idle(every, left_out, grid, case, below, hidden_alone=True)
+
+
+def _rows(even: Array) -> Array:
+    """Return the coordinates at which rays between even rings are cast."""
+    return np.arange(1, ROWS * len(even) + 1) * (even[0] / ROWS)
 
 
 def _audit_gaps(
@@ -156,12 +176,14 @@ def _audit_idle(
     grid: RingGrid,
     case: AuditCase,
     findings: AuditFindings,
+    *,
+    hidden_alone: bool = False,
 ) -> None:
     """Check that rings left out would light nothing, and that those shown may.
 
     The object is where rays meet it and where the panel holds its vertices. The band of
     a ring reaches to its neighbours, and `rig.rings.margin_m` beyond at the standoff; a
-    row of the grid is left to rounding. Rings of a family may light another member.
+    row of the grid is left to rounding.
     """
     rig, projector = case.plan.document.rig, grid.projector
     margin = projector.light.coordinate_of(
@@ -179,7 +201,7 @@ def _audit_idle(
     for wrong, key, words in (
         (hidden & lights, "left_out", "light the object and are left out"),
         (
-            ~hidden & ~lights & (not case.plan.of_member),
+            ~hidden & ~lights & (not hidden_alone),
             "ring_radii",
             "light nothing of the object and are shown",
         ),
