@@ -11,6 +11,7 @@ from support.plain_shapes import grid
 from geometry.mesh.mesh import TriangleMesh
 from planning import RigPlan, load_rig, plan_rig, verify_plan
 from planning.cli.declared.plan_checks import check_options
+from planning.cli.lines.comparison import compared
 from planning.cli.main import commands
 from planning.cli.output_folder import exchanged
 from planning.model.errors import InputError, PlanFileError
@@ -133,6 +134,18 @@ def test_the_share_of_members_that_is_asked_saves_devices(rig, few):
     assert met(half.members[1]) == 0.0
     assert half.missed == ()
     assert verify_plan(half, check_pixels=False, threads=1).passed
+
+
+def test_a_family_is_compared_by_its_worst_member_and_says_of_how_many(both):
+    rows = {row.what: row for row in compared(both, both.members[0])}
+    assert (rows["members"].first, rows["members"].differs) == (
+        "each of 2 members",
+        True,
+    )
+    worst = both.document.family.worst
+    assert both.document.own_mesh == both.document.meshes[worst]
+    other = _with_family(both, worst=1 - worst).document
+    assert other.own_mesh == both.document.meshes[1 - worst]
 
 
 def test_members_have_the_same_rig_and_each_its_own_claims(both):

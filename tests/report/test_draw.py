@@ -415,6 +415,14 @@ def test_the_picture_has_its_size_and_shows_both_kinds_of_device(plan):
     assert len(like(picture, BLUE)[0]) > 200
 
 
+def test_a_mesh_whose_name_has_two_lines_is_told_in_one(plan):
+    """Pillow measures no text of several lines."""
+    record = plan.document.own_mesh.changed(path="two\nlines.obj")
+    named = RigPlan(plan.document.changed(meshes=(record,)), plan.surface)
+    picture = draw_rig(named, size=(1000, 640), face_status=status_of(named))
+    assert len(like(picture, ORANGE)[0]) > 200
+
+
 def test_devices_stand_on_the_right_sides_of_the_map(mesh):
     # In the map (upper right panel) +x is right and +y up: the projector stands at -x,
     # the camera at -y.

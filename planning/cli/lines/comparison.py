@@ -10,6 +10,7 @@ from planning.model.document.certificates import Certificate
 from planning.model.plan import RigPlan
 from planning.model.words import percent
 from planning.report.summary.devices.station_lines import STATIONS, device_counts
+from planning.report.summary.family_lines import members_words
 from planning.report.summary.shortfall import missing
 
 _NONE = "-"
@@ -58,7 +59,9 @@ def comparison_lines(rows: Sequence[Row], names: tuple[str, str]) -> list[str]:
 
 def _asked(plan: RigPlan) -> Iterator[tuple[str, str]]:
     document, asked = plan.document, plan.requirements
-    record = document.meshes[0]
+    record = document.own_mesh
+    if document.family is not None:
+        yield "members", members_words(plan)
     yield "mesh", Path(record.path or "the mesh").name
     x, y, z = 1e3 * np.diff(plan.surface.mesh.bounds, axis=0)[0]
     yield "its size [mm]", f"{x:.1f} x {y:.1f} x {z:.1f}"

@@ -137,6 +137,12 @@ class PlanDocument(Part):
     reconstruction: ReconstructionRecord | None
     timings_s: dict[str, float]
 
+    @property
+    def own_mesh(self) -> MeshRecord:
+        """The mesh that the plan speaks of: of a family's that of its worst member."""
+        worst = 0 if self.family is None else self.family.worst
+        return self.meshes[min(worst, len(self.meshes) - 1)]
+
     @model_validator(mode="after")
     def _stations_hold_devices(self) -> Self:
         stations = () if self.stations is None else self.stations.stations

@@ -225,7 +225,9 @@ def _draw_title(
     pad, middle = 16 * SUPERSAMPLING, size[1] // 2
     draw.text((pad, middle), headline, INK, font=font(24.0), anchor="lm")
     extent = 1e3 * np.ptp(plan.surface.mesh.bounds, axis=0)
-    name = _shortened(Path(plan.document.meshes[0].path or "").name)
+    name = Path(plan.document.own_mesh.path or "").name
+    # Pillow measures one line at a time.
+    name = _shortened(" ".join(name.split()))
     size_mm = f"{' x '.join(f'{side:.0f}' for side in extent)} mm (x, y, z)"
     detail = f"{name}, {size_mm}" if name else size_mm
     left = pad + draw.textlength(headline, font=font(24.0)) + 1.5 * pad

@@ -76,7 +76,7 @@ def page_of(plan: RigPlan, *, threads: int, error_m: Array | None = None) -> str
     facts = per_face(plan, samples, threads=threads)
     told, payload = viewer_facts(plan, samples, facts, error_m)
     style, script = _resource("page.css"), _resource("viewer.js")
-    mesh = plan.document.meshes[0].path
+    mesh = plan.document.own_mesh.path
     title = f"Rig plan for {PurePath(mesh).name if mesh else 'a surface'}"
     document = plan.document
     footer = (

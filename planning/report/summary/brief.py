@@ -77,7 +77,7 @@ def _head(plan: RigPlan, short: Sequence[Shortfall]) -> Iterator[Block]:
     if document.stations is not None:
         devices = f"{title_words(document)} ({devices})"
     state = f", {_state(plan)}" if _state(plan) else ""
-    name = members_words(plan) or Path(document.meshes[0].path or "the mesh").name
+    name = members_words(plan) or Path(document.own_mesh.path or "the mesh").name
     if short:
         figures = [one.figure for one in short[:2]]
         more = f"; and {len(short) - 2} more" if len(short) > 2 else ""

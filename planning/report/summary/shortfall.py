@@ -198,7 +198,7 @@ def _inside(document: PlanDocument) -> str:
     inside = document.coverage.unreachable_inside_m2
     if not inside > 0.0:
         return ""
-    hollow = document.meshes[0].shell.kind == "hollow shell"
+    hollow = document.own_mesh.shell.kind == "hollow shell"
     where = "lies inside the hollow body" if hollow else "lies in cavities"
     return f"; {area_words(inside)} of it {where}"
 

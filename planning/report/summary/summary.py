@@ -68,7 +68,7 @@ def summary(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
 
 def _head(plan: RigPlan) -> str:
     document, workspace = plan.document, plan.requirements.workspace
-    mesh, evaluation = document.meshes[0], document.evaluation
+    mesh, evaluation = document.own_mesh, document.evaluation
     size = np.diff(plan.surface.mesh.bounds, axis=0)[0] * 1e3
     cut = "; TRUNCATED" if document.truncated else ""
     cut += f"; {unchecked(plan)}" if document.reconstruction is None else ""
