@@ -120,6 +120,20 @@ def test_a_head_that_holds_nothing_is_refused(plan, handmade):
         handmade.tampered(plan, lambda d: d["rig"]["head"].update(devices=[]))
 
 
+def test_cameras_of_heads_that_cross_measure_with_no_projector_but_the_plans(few):
+    """Beside heads of the reference set they would, and claim to cover all that is lit.
+
+    Pairs of one head alone are 15 degrees apart or more: at 600 mm that is 160 mm.
+    """
+    limits = {"max_sigma_mm": 1.0, "min_angle_deg": 16.0}
+    rig = head_rig(head={"cross": True}, limits=limits)
+    plan = planned(rig, max_heads=2, pattern="dense")
+    target, proof = plan.coverage.target, plan.document.certificates.cameras
+    assert target.measured_m2 < 0.5 * target.lit_m2
+    assert proof.best_area.value_m2 == pytest.approx(target.measured_m2, rel=0.15)
+    assert audit_plan(plan).failures == ()
+
+
 def test_a_pair_across_heads_measures_nothing(plan, handmade):
     """Without names of stations more is measured than was claimed, or as much."""
 

@@ -34,7 +34,7 @@ _LONGEST_S = 400
 # Told again, for a library that calls back may swallow it.
 _AGAIN_S = 20
 _INTERRUPTED = 130
-_AXES = DRAWS.axes.count
+_AXES, _COVERED = DRAWS.axes.count, 1000
 
 
 class _TooLongError(Exception):
@@ -117,8 +117,9 @@ def _working_little(job: Job) -> Generator[None]:
         else:
             work_least(patch)
             bound_roughly(patch)
-            # How far light reaches is held to a twentieth: few samples don't tell.
-            draw_fewer(patch, axes=_AXES)
+            # How far light reaches is held to a twentieth: few samples don't tell. Nor
+            # do covers of fewer than the audit takes them to be chosen on.
+            draw_fewer(patch, axes=_AXES, projectors=_COVERED, cameras=_COVERED)
             patch.setattr(Rig, "n_projector_poses", 80)
             patch.setattr(Rig, "n_camera_poses", 60)
         # A run that was cut ends itself, not this process.

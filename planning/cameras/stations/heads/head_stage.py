@@ -58,6 +58,12 @@ def stages_of(
     views = CandidateViews(scene, cameras)
     seen = views.on(samples.target)
     measured = measured_by(scene, cameras, samples, seen)
+    # One without a station would measure with projectors of the reference set, too.
+    free = [k for k, camera in enumerate(cameras) if not camera.station]
+    planned_lit = lit[bright, :n_projectors]
+    own = LitSamples.of(lamps[:n_projectors], samples.target, planned_lit)
+    some, theirs = ([of[k] for k in free] for of in (cameras, seen))
+    measured[:, free] = measured_by(scene, some, own, theirs)
     cover = candidate_cover(scene, measured, samples, cameras)
     cover = replace(cover, n_existing=n_cameras)
     proof = unproved(cover, target.samples.weight).changed(given=0)
