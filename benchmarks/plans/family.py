@@ -40,7 +40,7 @@ _REAL = (
 )
 _HEADS = 24
 # Projectors at most: the bust is hollow and the large head has its inner surfaces.
-_MOST = {"heads": 12, "real": 40}
+_MOST = {"heads": 12, "real": 60}
 _EQUAL = 1.0 - 1e-9
 
 
