@@ -121,7 +121,7 @@ class FolderEntries:
             for path in self.folder.iterdir():
                 # Another run may drop it meanwhile.
                 with suppress(FileNotFoundError):
-                    if _OURS.fullmatch(path.name):
+                    if _OURS.fullmatch(path.name) and path.is_file():
                         told = path.stat()
                         yield told.st_mtime, told.st_size, path
 

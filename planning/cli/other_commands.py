@@ -18,6 +18,7 @@ from geometry.shapes.sample_head.sample_head import (
 )
 from planning.cache.cache import VARIABLE, cache_folder
 from planning.cache.entries import FolderEntries
+from planning.model.errors import InputError
 from planning.model.files import write_atomically
 from planning.model.plan import RigPlan
 from planning.model.words import count_words
@@ -110,6 +111,10 @@ def cache_command(*, clear: bool) -> int:
     if folder is None:
         click.echo(f"{VARIABLE} is empty: nothing is kept for later runs")
         return 0
+    if folder.exists() and not folder.is_dir():
+        raise InputError(
+            f"{VARIABLE} names {folder}, which is no folder: name one, or none at all"
+        )
     entries = FolderEntries(folder)
     count, size = entries.size()
     held = f"{count_words(count, 'answer')}, {1e-6 * size:.1f} MB"

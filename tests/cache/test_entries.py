@@ -64,6 +64,9 @@ def test_only_our_own_files_are_counted_and_dropped(entries):
     assert entries.size()[0] == 2
     assert not old.exists()
     assert new.exists()
+    folder = f"{KEYS[1]}.ringrig"
+    (entries.folder / folder).mkdir()
+    strangers.append(folder)
     entries.clear()
     assert sorted(path.name for path in entries.folder.iterdir()) == sorted(strangers)
 

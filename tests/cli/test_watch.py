@@ -32,6 +32,12 @@ def test_the_cache_is_shown_and_cleared(tmp_path, monkeypatch):
     assert "0 answers" in _told("cache").stdout
     monkeypatch.setenv("RINGRIG_CACHE", "")
     assert "nothing is kept" in _told("cache").stdout
+    file = tmp_path / "file"
+    file.write_text("")
+    monkeypatch.setenv("RINGRIG_CACHE", str(file))
+    refused = _told("cache", "clear")
+    assert refused.exit_code == 3
+    assert f"names {file}, which is no folder" in refused.stderr
 
 
 @pytest.mark.parametrize(
