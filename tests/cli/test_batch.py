@@ -2,6 +2,7 @@
 
 import csv
 import os
+import shutil
 import signal
 from dataclasses import replace
 
@@ -13,7 +14,8 @@ from support.plain_shapes import box
 from planning.cli.batch import batch_command, part_task, runners
 from planning.cli.batch.ledger import is_whole, read_rows, row_of, write_rows
 from planning.cli.batch.part_task import PartEnd, PartTask, plan_part
-from planning.cli.batch.parts import find_parts, part_files, rig_files
+from planning.cli.batch.parts import find_parts
+from planning.cli.batch.sent_files import part_files, rig_files
 from planning.cli.main import commands
 from planning.model.errors import InputError
 
@@ -149,6 +151,47 @@ def test_an_interrupted_batch_keeps_what_ended(done, tmp_path, monkeypatch):
     ended = run(place / "parts", "-o", out, "--jobs", 1, *FAST)
     assert ended.exit_code == 130
     assert [row["part"] for row in rows(out)] == ["broken.stl"]
+
+
+def test_an_interrupted_later_run_keeps_what_was_finished(done, tmp_path, monkeypatch):
+    place, _ = done
+    again = tmp_path / "copy"
+    shutil.copytree(place, again)
+
+    def planned(task):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(runners, "plan_part", planned)
+    monkeypatch.setattr(batch_command, "stop_parts", lambda: None)
+    monkeypatch.setattr(runners, "stop_parts", lambda: None)
+    words = (again / "parts", "-o", again / "out", "--rig", again / "few.toml", *FAST)
+    before = rows(again / "out")
+    ended = run(*words, "--no-report", "--jobs", 1)
+    assert ended.exit_code == 130
+    assert rows(again / "out") == before
+    begun = _counted(monkeypatch)
+    run(*words, "--no-report")
+    assert begun == ["broken.stl"]
+
+
+def test_a_folder_that_cant_be_written_is_one_parts_failure(
+    done, tmp_path, monkeypatch
+):
+    place, _ = done
+    plan = place / "out" / "sub" / "block"
+    files = {path.name: path.read_bytes() for path in plan.iterdir() if path.is_file()}
+    monkeypatch.setattr(
+        runners, "plan_part", lambda task: PartEnd(task.name, 0, "", 1.0, files)
+    )
+    (tmp_path / "broken" / "patterns").mkdir(parents=True)
+    (tmp_path / "broken" / "patterns" / "notes.txt").write_text("somebody's")
+    ended = run(place / "parts", "-o", tmp_path, "--jobs", 1, *FAST)
+    assert ended.exit_code == 1, ended.stderr
+    broken, block = rows(tmp_path)
+    assert (broken["verdict"], block["exit"]) == ("failed", "0")
+    assert "isn't of a plan" in broken["message"]
+    assert "FAILED   broken.stl" in ended.stdout
+    assert "1 of 2 parts" in ended.stdout
 
 
 def test_a_process_that_is_killed_is_begun_again_and_then_told(monkeypatch, tmp_path):

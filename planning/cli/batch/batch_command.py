@@ -13,18 +13,22 @@ from geometry.parallel import n_threads
 from planning.cache.content import code_content
 from planning.cli.console import print_json, reporter
 from planning.cli.output_folder import exchanged
-from planning.model.errors import InputError, PlanFileError
+from planning.model.errors import PlanningError
 from planning.model.progress import Report
 from planning.model.words import count_words
 
 from .index_page import NAME as INDEX
 from .index_page import write_index
 from .ledger import NAME, Row, asked_of, is_whole, read_rows, row_of, write_rows
+from .part_names import one_line
 from .part_task import PartEnd, PartTask, stop_parts
-from .parts import Part, find_parts, part_files, rig_files
+from .parts import Part, find_parts
 from .runners import cluster, local
+from .sent_files import part_files, rig_files
 
 _INTERRUPTED = 130
+# Of parts whose files can't be read or written, and of those whose plan is none.
+_NO_FILE, _NO_PLAN = 2, -1
 
 
 @dataclass(eq=False)
@@ -33,6 +37,8 @@ class _Batch:
 
     Attributes:
         threads: Of each part's process.
+        before: Rows of an earlier run.
+        rows: Of the parts that ended in this one, or are left as they are.
         asked: Hash of all that each part's plan follows from.
     """
 
@@ -42,6 +48,7 @@ class _Batch:
     rig: Mapping[str, bytes]
     report: Report
     threads: int = 1
+    before: Mapping[str, Row] = field(default_factory=dict[str, Row])
     rows: dict[str, Row] = field(default_factory=dict[str, Row])
     asked: dict[str, str] = field(default_factory=dict[str, str])
 
@@ -57,17 +64,16 @@ class _Batch:
 
     def pending(self, *, again: bool) -> Iterator[PartTask]:
         """Yield what isn't finished; tell what is, and what can't be read."""
-        before = {} if again else read_rows(self.out)
         for part in self.parts.values():
             try:
                 task = self.task(part)
-            except InputError as error:
-                self.end(PartEnd(part.name, error.exit_code, str(error), 0.0, {}))
+            except (PlanningError, OSError) as error:
+                code = getattr(error, "exit_code", _NO_FILE)
+                self.end(PartEnd(part.name, code, one_line(str(error)), 0.0, {}))
                 continue
-            row = before.get(part.name)
             asked = self.asked[part.name] = asked_of(task, code_content())
-            same = row is not None and (row.asked, row.folder) == (asked, part.folder)
-            if row is not None and same and is_whole(row, self.out):
+            row = None if again else self.before.get(part.name)
+            if row is not None and row.asked == asked and is_whole(row, self.out):
                 self.rows[part.name] = row
                 self.report(f"{part.name}: {row.verdict}, from an earlier run")
                 continue
@@ -76,17 +82,15 @@ class _Batch:
     def end(self, end: PartEnd) -> None:
         """Put what a part wrote in its place, and tell how it ended."""
         part, asked = self.parts[end.name], self.asked.get(end.name, "")
-        if end.code in (0, 1):
-            with exchanged(_made(self.out / part.folder)) as fresh:
-                for name, content in end.files.items():
-                    path = fresh / name
-                    path.parent.mkdir(parents=True, exist_ok=True)
-                    path.write_bytes(content)
         try:
+            if end.code in (0, 1):
+                _keep(end.files, self.out / part.folder)
             row = row_of(end, part.folder, self.out, asked)
-        except PlanFileError as error:
-            # Whatever a worker sent: it is no plan.
-            row = row_of(replace(end, code=-1, message=str(error)), "", self.out, "")
+        except (PlanningError, OSError) as error:
+            # A full disk, or whatever a worker sent: the others go on.
+            code = _NO_FILE if isinstance(error, OSError) else _NO_PLAN
+            failed = replace(end, code=code, message=one_line(str(error)))
+            row = row_of(failed, "", self.out, "")
         self.rows[end.name] = row
         self.write()
         why = f": {row.message}" if row.failed and row.message else ""
@@ -94,14 +98,28 @@ class _Batch:
         self.report(f"{end.name}: {row.verdict}{why} ({n})")
 
     def write(self) -> None:
-        """Write the table and the page of what ended so far."""
-        write_rows(self.rows.values(), self.out)
-        write_index(list(self.rows.values()), self.out)
+        """Write the table and the page of what ended so far, in earlier runs too."""
+        rows = [*{**self.before, **self.rows}.values()]
+        write_rows(rows, self.out)
+        write_index(rows, self.out)
 
 
-def _made(folder: Path) -> Path:
+def _keep(files: Mapping[str, bytes], folder: Path) -> None:
     folder.parent.mkdir(parents=True, exist_ok=True)
-    return folder
+    with exchanged(folder) as fresh:
+        for name, content in files.items():
+            path = fresh / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
+
+
+def _before(parts: Mapping[str, Part], out: Path) -> dict[str, Row]:
+    """Return the rows of an earlier run: of plans where these parts' go, or of none."""
+    return {
+        name: row
+        for name, row in read_rows(out).items()
+        if name in parts and row.folder in ("", parts[name].folder)
+    }
 
 
 def batch_command(
@@ -123,7 +141,8 @@ def batch_command(
     report = reporter(quiet=options["quiet"])
     rig = rig_files(options["rig_name"])
     jobs = options["jobs"] or max(1, n_threads() // 2)
-    batch = _Batch(parts, out, words, rig, report, max(1, n_threads() // jobs))
+    threads, before = max(1, n_threads() // jobs), _before(parts, out)
+    batch = _Batch(parts, out, words, rig, report, threads, before)
     interrupted = False
     with ExitStack() as stack:
         if options["scheduler"] is None:

@@ -12,14 +12,20 @@ import threading
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
+
+from planning.model.errors import InputError, PlanningError
+
+from .part_names import one_line
 
 # Times that a part is begun whose process was killed.
 _TIMES = 2
 _PLAN = "from planning.cli.main import main; main()"
-# In the folder where it runs.
-_OUT, _RIG = "plan", "rig"
+# Folders of its own for each, so that no file's name is in another's way.
+_MESH, _RIG, _OUT = "part", "rig", "plan"
+# Of an end for which no run's exit code speaks: as of every file that can't be written.
+_NOT_RUN = 2
 
 
 @dataclass(frozen=True)
@@ -76,34 +82,43 @@ def stop_parts() -> None:
 def plan_part(task: PartTask) -> PartEnd:
     """Plan a part in a process of its own, and return what that wrote."""
     begin = time.monotonic()
-    with TemporaryDirectory(prefix="ringrig-") as place:
-        _put(Path(place), task.mesh)
-        _put(Path(place) / _RIG, task.rig)
-        code, message = -int(signal.SIGKILL), ""
-        for _ in range(_TIMES):
-            code, message = _run(_command(task), place)
-            if code >= 0 or _stopped.is_set():
-                break
-        if code < 0:
-            message = f"killed by signal {-code}, {_TIMES} times: perhaps it took more "
-            message += "memory than there is"
-        out = Path(place) / _OUT
-        files = {
-            path.relative_to(out).as_posix(): path.read_bytes()
-            for path in sorted(out.rglob("*"))
-            if path.is_file()
-        }
+    files: dict[str, bytes] = {}
+    try:
+        with TemporaryDirectory(prefix="ringrig-") as place:
+            code, message = _planned(task, Path(place))
+            out = Path(place) / _OUT
+            files = {
+                path.relative_to(out).as_posix(): path.read_bytes()
+                for path in sorted(out.rglob("*"))
+                if path.is_file()
+            }
+    except (PlanningError, OSError) as error:
+        code, message = _NOT_RUN, one_line(str(error))
     return PartEnd(task.name, code, message, time.monotonic() - begin, files)
 
 
-def _command(task: PartTask) -> list[str]:
-    words = [*task.words, "--mesh", next(iter(task.mesh)), "-o", _OUT, "--quiet"]
+def _planned(task: PartTask, place: Path) -> tuple[int, str]:
+    """Plan a part in a folder that is its own; return its exit code and last words."""
+    here = _put(place / _MESH, task.mesh)
+    words = [*task.words, "--mesh", next(iter(task.mesh)), "--quiet"]
+    words += ["-o", os.path.relpath(place / _OUT, here)]
+    beside = os.path.relpath(_put(place / _RIG, task.rig), here) + os.sep
     if task.rig:
-        words += ["--rig", f"{_RIG}/{next(iter(task.rig))}"]
-    return [sys.executable, "-c", _PLAN, *words, "--threads", str(task.threads)]
+        words += ["--rig", beside + next(iter(task.rig))]
+    words += ["--threads", str(task.threads)]
+    code, message = -int(signal.SIGKILL), ""
+    for _ in range(_TIMES):
+        code, message = _run([sys.executable, "-c", _PLAN, *words], here)
+        if code >= 0 or _stopped.is_set():
+            # Nobody knows the folder that its rig file was in here.
+            return code, message.replace(beside, "")
+    return code, (
+        f"killed by signal {-code}, {_TIMES} times: perhaps it took more memory than "
+        f"there is"
+    )
 
 
-def _run(command: Sequence[str], place: str) -> tuple[int, str]:
+def _run(command: Sequence[str], place: Path) -> tuple[int, str]:
     # The package that this is, wherever it was imported from.
     home = str(Path(__file__).parents[3])
     paths = [home, *filter(None, [os.environ.get("PYTHONPATH")])]
@@ -128,8 +143,36 @@ def _run(command: Sequence[str], place: str) -> tuple[int, str]:
     return process.returncode, lines[-1].removeprefix("plan: ") if lines else ""
 
 
-def _put(folder: Path, files: Mapping[str, bytes]) -> None:
+def _put(folder: Path, files: Mapping[str, bytes]) -> Path:
+    """Write files, and return the folder at or below this one that their names are of.
+
+    However many `..` a name begins with, its file stays in `folder`.
+
+    Raises:
+        InputError: If a name is an absolute path, or two are of one place.
+    """
+    start = folder.joinpath(*["in"] * max(map(_climbs, files), default=0))
+    written: dict[str, str] = {}
     for name, content in files.items():
-        path = folder / name
+        path = start / name
+        place = os.path.normpath(path)
+        if not Path(place).is_relative_to(folder):
+            raise InputError(f"{name}: must be named from a folder; give no whole path")
+        other = written.setdefault(place, name)
+        if files[other] != content:
+            raise InputError(
+                f"{name} and {other}: are two files of one place when they are sent "
+                f"along; name them without .. and links"
+            )
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content)
+    return start
+
+
+def _climbs(name: str) -> int:
+    """Return how many folders a name leads above where it begins."""
+    depth = highest = 0
+    for part in PurePosixPath(name).parts:
+        depth += -1 if part == ".." else 1
+        highest = max(highest, -depth)
+    return highest
