@@ -2,8 +2,7 @@
 
 import math
 
-from planning.model.document.certificates import Count
-from planning.model.document.part import Part
+from planning.model.document.part import Count, Part
 from planning.model.document.ring_records import AxisTaken
 
 # Coverage and deviations are compared as they are printed: 0.1 %, 0.001 mm.

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, BinaryIO, Self
+from typing import Any, BinaryIO, Self, cast
 
 import numpy as np
 from pydantic import ValidationError
@@ -18,7 +18,7 @@ from planning.model.document.survival_records import SurvivalRecord
 
 from .devices.planned import PlannedCamera, PlannedProjector
 from .errors import InputError, PlanFileError, PlanningError
-from .files import reading, write_together
+from .files import plain_json, reading, unusable_numbers, write_together
 from .proofs import ProofFile
 from .requirements import Requirements
 from .surface import Surface
@@ -191,7 +191,6 @@ class RigPlan:
         path = Path(path)
         with reading(path, PlanFileError):
             content = file_content(path)
-        _require_plan(content, path)
         document = _document(content, str(path))
         surface = document.surface
         loaded = Surface.load(path.parent / surface.path, surface.sha256)
@@ -224,21 +223,27 @@ def member_path(name: str) -> str:
     return f"members/{name}/plan.json"
 
 
-def _require_plan(content: bytes, path: Path) -> None:
-    """Refuse what isn't a plan of our version."""
-    try:
-        document = json.loads(content)
-    except (ValueError, RecursionError) as error:
-        raise PlanFileError(f"{path}: not readable as JSON ({error})") from None
-    if not isinstance(document, dict) or document.get("format") != FORMAT:
-        raise PlanFileError(f"{path}: not a plan, its `format` must be '{FORMAT}'")
-    if document.get("version") != VERSION:
-        raise PlanFileError(
-            f"{path}: version {document.get('version')}, this program reads {VERSION}"
-        )
+def _require_plan(document: object, where: str) -> None:
+    """Refuse what isn't a plan of our version, or has numbers that none can use."""
+    values = cast(dict[str, Any], document) if isinstance(document, dict) else {}
+    if values.get("format") != FORMAT:
+        raise PlanFileError(f"{where}: not a plan, its `format` must be '{FORMAT}'")
+    version = values.get("version")
+    # To Python 1.0 and True are 1, too.
+    if type(version) is not int or version != VERSION:
+        told = repr(version)[:60]
+        raise PlanFileError(f"{where}: version {told}, this program reads {VERSION}")
+    if faults := list(unusable_numbers(values))[:_MOST_FAULTS]:
+        lines = (f"{where}: {fault}; plan again" for fault in faults)
+        raise PlanFileError("\n".join(lines))
 
 
 def _document(text: str | bytes, where: str) -> PlanDocument:
+    try:
+        values = plain_json(text)
+    except (ValueError, RecursionError) as error:
+        raise PlanFileError(f"{where}: not readable as JSON ({error})") from None
+    _require_plan(values, where)
     try:
         document = PlanDocument.read(text)
         for record in (*document.projectors, *document.cameras):

@@ -67,6 +67,41 @@ ON_TRUST = {
     ),
     "what a family's members take alone": ("family.projectors", "family.cameras"),
 }
+# Figures that only the code that made them tells again, and then to the last digit.
+UNAUDITED = {
+    "how curved the surface is, and in which neighbourhood that was measured": (
+        "regions.*.mean_curvedness",
+        "surface.curvature_radius_m",
+    ),
+    "what kind of body the mesh is, and its walls": ("meshes.*.shell",),
+    "how many seam points cameras share, and at a border or not": (
+        "baselines.*.n_seam",
+        "baselines.*.shares_border",
+    ),
+    "the region that fewer projectors light worst": ("marginal.*.worst_region*",),
+    "how many samples the plan's areas are of": ("coverage.samples",),
+}
+# Likewise of the check from pixels.
+UNAUDITED_OF_CHECK = {
+    "the largest error, and how much is off by more than 1 mm": (
+        "reconstruction.accuracy_max_m",
+        "reconstruction.beyond_1mm_fraction",
+    ),
+    "edges that gave no point, and the noise of pixels": (
+        "reconstruction.left_out_fraction",
+        "reconstruction.pixel_noise",
+    ),
+    "errors and points of parts of the surface": (
+        "reconstruction.by_region",
+        *(f"reconstruction.*.{name}" for name in ("n_points", "predicted_missing")),
+        *(f"reconstruction.{part}.*_m" for part in ("dominant", "whole_surface")),
+    ),
+    "what light that bounces is taken to do": (
+        *(f"reconstruction.interreflection.{n}" for n in ("albedo", "cell_m")),
+        *(f"reconstruction.interreflection.{n}" for n in ("n_cells", "worst_*")),
+    ),
+    "likely causes of what the check missed": ("reconstruction.failures",),
+}
 # Of the mesh file, which isn't part of the plan.
 _OF_FILE = "the mesh file, its digest, size and repairs (meshes): give --mesh {path}"
 
@@ -101,16 +136,20 @@ def taken_on_trust(
     """
     if plan.document.reconstruction is None:
         figures_held = EXACTLY
+    of_check = _of_check(plan, figures_held)
     if claims_held == WHOLLY:
-        return _digits(("figures of the check", figures_held))
-    lines = [*held_against_others(plan, over_poses)]
+        return of_check
+    lines = [*held_against_others(plan, over_poses), *of_surface(plan, claims_held)]
     for kind in ("projectors", "cameras"):
         proof = getattr(plan.document.certificates, kind)
         if proof is None or not proof.needed.lower_bound:
             continue
         if proof.candidates.status != "proved" or plan.proof is None:
             lines.append(f"the bound on {kind} over the candidates: claimed, no proof")
-    lines += _digits(("claims", claims_held), ("figures of the check", figures_held))
+    if claims_held != EXACTLY:
+        lines += _told(plan, UNAUDITED)
+        lines.append(f"the last digits of claims: {claims_held or 'not compared'}")
+    lines += of_check
     planned = {("projector", len(plan.projectors)), ("camera", len(plan.cameras))}
     unnamed = [
         place
@@ -149,11 +188,47 @@ def held_against_others(
     return tuple(lines)
 
 
-def _digits(*parts: tuple[str, str]) -> tuple[str, ...]:
+def of_surface(plan: RigPlan, claims_held: str) -> tuple[str, ...]:
+    """Return what of `surface.npz` is taken as it stands there, a line each.
+
+    Not again computed, it is the planner's word; and chosen faces are the user's.
+    """
+    surface, requirements = plan.document.surface, plan.requirements
+    kind = "curvature" if surface.selection is None else surface.selection.kind
+    lines: list[str] = []
+    if kind != "curvature" or claims_held != EXACTLY:
+        what = "which faces are the target" * (requirements.target == "dominant")
+        chosen = "by curvature, says surface.selection"
+        if kind != "curvature":
+            chosen = "by a file that surface.selection names"
+        what = what or "which faces are of which region"
+        lines.append(f"{what} (region in surface.npz): chosen {chosen}")
+    limited = requirements.projector.min_tangent_angle > 0.0 and not plan.cameras_alone
+    if claims_held != EXACTLY and limited:
+        lines.append(
+            "the steep directions T1 (steep in surface.npz), about which tangent "
+            "angles are limited: a face without one has no such limit"
+        )
+    return tuple(lines)
+
+
+def _of_check(plan: RigPlan, figures_held: str) -> tuple[str, ...]:
+    """Return what of the recorded check was believed, a line each."""
+    if figures_held == EXACTLY:
+        return ()
+    if not figures_held:
+        return ("every figure of the check (reconstruction): not compared",)
+    digits = f"the last digits of figures of the check: {figures_held}"
+    return (*_told(plan, UNAUDITED_OF_CHECK), digits)
+
+
+def _told(plan: RigPlan, table: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
+    """Return which claims of a table a plan makes, a line a kind with their keys."""
+    keys = list(_keys(plan.to_document()))
     return tuple(
-        f"the last digits of {what}: {held or 'not compared'}"
-        for what, held in parts
-        if held != EXACTLY
+        f"{what} ({', '.join(named)})"
+        for what, patterns in table.items()
+        if (named := [p for p in patterns if any(is_under(k, {p: ""}) for k in keys)])
     )
 
 

@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.parallel import abandonable, n_threads
-from planning.model.errors import InputError
+from planning.model.errors import InputError, PlanningError
 from planning.model.plan import RigPlan
 from planning.verify.audit.audit import audited
 from planning.verify.audit.audit_case import AuditCase, examine
@@ -123,7 +123,7 @@ def verify_plan(
         room = assumed_light(Scanner.of(plan)).ambient
         differs += contradictions(recorded, room, plan.digest)
     how = {"photometry": photometry, "physics": physics}
-    pixels = None
+    pixels, unrendered = None, ()
     # Pixels need what was recomputed, and no claim.
     with abandonable(1) as pool:
         told = say if over_poses else None
@@ -131,13 +131,16 @@ def verify_plan(
         try:
             if check_pixels:
                 pixels = _reconstruct(plan, case, truth, other, seed, threads, say, how)
-        except Exception:
-            # Of a plan without meaning that is said, and not how it can't be rendered.
-            auditing.result()
-            raise
+        except Exception as error:
+            # Of a plan without meaning, or with false claims, that is said, and not how
+            # it can't be rendered.
+            if isinstance(error, PlanningError) or not auditing.result().failures:
+                auditing.result()
+                raise
+            unrendered = (f"pixels: not to be rendered ({type(error).__name__})",)
         audit = auditing.result()
     claims_held, figures_held = "", ""
-    failures = [*audit.failures, *differs]
+    failures = [*audit.failures, *differs, *unrendered]
     if not failures:
         if again is not None:
             say("claims: computed again by the code that made them")
@@ -151,7 +154,7 @@ def verify_plan(
     elif pixels is not None:
         false, figures_held = hold_figures(plan, pixels.record(), seed)
         if recorded is not None and not recorded.passed and not false:
-            missed = pixels.failures
+            missed = pixels.failures or recorded.failures
         else:
             failures += (*pixels.failures, *false)
     return Verification(

@@ -1,13 +1,10 @@
 """`certificates`: what was proved of the numbers of devices, and over what."""
 
-from typing import Annotated, Literal
+from typing import Literal
 
 from pydantic import Field
 
-from .part import Part
-
-# A number of devices, poses, samples or cells.
-Count = Annotated[int, Field(ge=0)]
+from .part import Count, Part
 
 
 class CandidateBound(Part):

@@ -2,26 +2,26 @@
 
 from planning.model.words import percent
 
-from .part import Part, Vector3
+from .part import Count, Part, Size, Vector3
 
 
 class CompletenessRecord(Part):
     """Share of the target predicted measured that has a point within a distance."""
 
-    threshold_m: float
-    fraction: float
+    threshold_m: Size
+    fraction: Size
 
 
 class ConfusionRecord(Part):
     """Shares of an area: predicted or not, measured or not."""
 
-    both: float
-    missing: float
-    unexpected: float
-    neither: float
-    beside: float
-    agreement: float
-    trivial_agreement: float
+    both: Size
+    missing: Size
+    unexpected: Size
+    neither: Size
+    beside: Size
+    agreement: Size
+    trivial_agreement: Size
 
 
 class ConfusionPair(Part):
@@ -46,12 +46,12 @@ class SurfaceShare(Part):
     """
 
     id: int | None = None
-    predicted: float | None
-    measured: float | None
-    predicted_missing: float | None
-    n_points: int
-    rms_m: float | None
-    p95_m: float | None
+    predicted: Size | None
+    measured: Size | None
+    predicted_missing: Size | None
+    n_points: Count
+    rms_m: Size | None
+    p95_m: Size | None
     bias_m: float | None
 
 
@@ -69,12 +69,12 @@ class InterreflectionRecord(Part):
         worst_at: Where that is.
     """
 
-    albedo: float
-    cell_m: float
-    n_cells: int
-    biased: float
+    albedo: Size
+    cell_m: Size
+    n_cells: Count
+    biased: Size
     worst_m: float | None = None
-    worst_sigma_m: float | None = None
+    worst_sigma_m: Size | None = None
     worst_at: Vector3 | None = None
 
     def warning(self) -> str:
@@ -103,19 +103,19 @@ class ReconstructionRecord(Part):
         asked: As of `coverage`.
     """
 
-    n_points: int
-    n_merged: int
-    redundant_fraction: float
-    accuracy_rms_m: float | None
-    accuracy_p95_m: float | None
+    n_points: Count
+    n_merged: Count
+    redundant_fraction: Size
+    accuracy_rms_m: Size | None
+    accuracy_p95_m: Size | None
     accuracy_bias_m: float | None
-    accuracy_max_m: float | None = None
-    left_out_fraction: float | None = None
-    beyond_1mm_fraction: float | None = None
+    accuracy_max_m: Size | None = None
+    left_out_fraction: Size | None = None
+    beyond_1mm_fraction: Size | None = None
     completeness: tuple[CompletenessRecord, ...]
-    predicted_missing: float | None
-    pixel_noise: float | None
-    ambient: float | None
+    predicted_missing: Size | None
+    pixel_noise: Size | None
+    ambient: Size | None
     confusion: ConfusionRecords | None = None
     by_region: tuple[SurfaceShare, ...] = ()
     dominant: SurfaceShare | None = None

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from .part import Part, Vector3
+from .part import Count, Part, Size, Vector3
 
 # Of a reference pose.
 Place = Annotated[int, Field(ge=0)]
@@ -13,7 +13,7 @@ Place = Annotated[int, Field(ge=0)]
 class Areas(Part):
     """The five areas that belong together, in [m²]."""
 
-    area_m2: float
+    area_m2: Size
     reachable_by_projectors_m2: float
     lit_m2: float
     reachable_by_cameras_m2: float
@@ -29,7 +29,7 @@ class Relaxation(Part):
     """
 
     change: str
-    reachable_share: float
+    reachable_share: Size
 
 
 class PredictedSigma(Part):
@@ -48,14 +48,14 @@ class PredictedSigma(Part):
             absent where nothing states it.
     """
 
-    median_m: float
-    p95_m: float
-    noise_median_m: float | None = None
-    noise_p95_m: float | None = None
+    median_m: Size
+    p95_m: Size
+    noise_median_m: Size | None = None
+    noise_p95_m: Size | None = None
     terms_rms_m: dict[
         Literal["edges", "light", "phase", "rings", "linearity"]
         | Literal["matches", "camera", "projector"],
-        float,
+        Size,
     ] = Field(default={})
 
 
@@ -78,7 +78,7 @@ class Coverage(Part):
         asked: Digest of what was asked of the plan, `asked_digest`.
     """
 
-    samples: int
+    samples: Count
     surface: Areas
     target: Areas
     uncovered_by_cause: dict[str, float]
@@ -106,13 +106,13 @@ class RobustRecord(Part):
         missed_by: How many of the rigs miss which figure; `missed_by_without` likewise.
     """
 
-    n_drawn: int
-    n_met: int
-    least: int
-    rounds: int
-    n_projectors_without: int
-    n_cameras_without: int
-    n_met_without: int
+    n_drawn: Count
+    n_met: Count
+    least: Count
+    rounds: Count
+    n_projectors_without: Count
+    n_cameras_without: Count
+    n_met_without: Count
     missed_by: dict[str, int] = Field(default_factory=dict)
     missed_by_without: dict[str, int] = Field(default_factory=dict)
 
@@ -130,7 +130,7 @@ class RegionCoverage(Part):
             too small for a floor what one would cost.
     """
 
-    samples: int
+    samples: Count
     reachable_by_projectors_m2: float
     lit_m2: float
     reachable_by_cameras_m2: float
@@ -152,13 +152,13 @@ class RegionRecord(Part):
     """
 
     id: int
-    area_m2: float
-    n_faces: int
+    area_m2: Size
+    n_faces: Count
     mean_normal: Vector3
     cone_angle: float
-    mean_curvedness: float
+    mean_curvedness: Size
     lit_by: tuple[str, ...]
-    lit_fraction: float
+    lit_fraction: Size
     centre_m: Vector3 | None = None
     coverage: RegionCoverage | None = None
 
@@ -174,11 +174,11 @@ class ProjectorMarginal(Part):
             absent where they are the plan's, or stand at none of these poses.
     """
 
-    n_projectors: int
+    n_projectors: Count
     lit_target_m2: float
     lit_surface_m2: float
     worst_region: int | None = None
-    worst_region_lit: float | None = None
+    worst_region_lit: Size | None = None
     reference: tuple[Place, ...] | None = None
 
     @property
@@ -194,7 +194,7 @@ class CameraMarginal(Part):
         reference: As of projectors.
     """
 
-    n_cameras: int
+    n_cameras: Count
     measured_target_m2: float
     measured_surface_m2: float
     reference: tuple[Place, ...] | None = None

@@ -10,7 +10,7 @@ from geometry.devices import ParallelModel, PinholeModel
 from planning.model.devices.bodies import Body
 
 from .head_records import CarrierRecord, HeadRecord, TurntableRecord
-from .part import Interval, Matrix3, Part, Resolution, Vector3
+from .part import Count, Interval, Matrix3, Part, Resolution, Size, Vector3
 
 
 class Units(Part):
@@ -31,10 +31,10 @@ class ShellRecord(Part):
     """What kind of body a mesh is: `solid`, `hollow shell` and so on."""
 
     kind: str
-    wall_m: float | None = None
-    mean_wall_m: float | None = None
-    inside_m2: float = 0.0
-    sealed_m2: float = 0.0
+    wall_m: Size | None = None
+    mean_wall_m: Size | None = None
+    inside_m2: Size = 0.0
+    sealed_m2: Size = 0.0
 
 
 class MeshRecord(Part):
@@ -44,9 +44,9 @@ class MeshRecord(Part):
     sha256: str | None
     unit: str
     scale_to_m: float
-    n_vertices: int
-    n_faces: int
-    area_m2: float
+    n_vertices: Count
+    n_faces: Count
+    area_m2: Size
     repairs: tuple[Repair, ...] = ()
     shell: ShellRecord = ShellRecord(kind="solid")
 
@@ -62,9 +62,9 @@ class SelectionRecord(Part):
     kind: str
     source: str | None
     sha256: str | None
-    n_faces: int
-    area_m2: float
-    n_removed_by_repair: int
+    n_faces: Count
+    area_m2: Size
+    n_removed_by_repair: Count
 
 
 class SurfaceRecord(Part):
@@ -72,8 +72,8 @@ class SurfaceRecord(Part):
 
     path: str
     sha256: str
-    curvature_radius_m: float
-    dominant_share: float
+    curvature_radius_m: Size
+    dominant_share: Size
     selection: SelectionRecord | None = None
 
 

@@ -7,13 +7,19 @@ absent from a file, and is then absent from the file that is written again.
 from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
+# A number of devices, poses, samples or cells.
+Count = Annotated[int, Field(ge=0)]
+# A length, an area, an error or a share of which a negative one means nothing.
+Size = Annotated[float, Field(ge=0.0)]
 Vector3 = tuple[float, float, float]
 Interval = tuple[float, float]
-Resolution = tuple[int, int]
-Matrix3 = tuple[Vector3, Vector3, Vector3]
+# Of images that fit into memory.
+_Pixels = Annotated[int, Field(ge=1, le=100_000)]
+Resolution = tuple[_Pixels, _Pixels]
 Row4 = tuple[float, float, float, float]
+_Rows3 = tuple[Vector3, Vector3, Vector3]
 
 
 class Part(BaseModel):
@@ -44,3 +50,12 @@ def _is_pose(rows: tuple[Row4, Row4, Row4, Row4]) -> tuple[Row4, Row4, Row4, Row
 
 # b_from_a, rows of a 4 x 4 matrix; its last column in [m].
 Pose = Annotated[tuple[Row4, Row4, Row4, Row4], AfterValidator(_is_pose)]
+
+
+def _is_camera_matrix(rows: _Rows3) -> _Rows3:
+    if not (rows[0][0] > 0.0 and rows[1][1] > 0.0):
+        raise ValueError("must hold focal lengths above 0")
+    return rows
+
+
+Matrix3 = Annotated[_Rows3, AfterValidator(_is_camera_matrix)]

@@ -3,12 +3,14 @@
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import AfterValidator
+from pydantic import AfterValidator, Field
 
-from .part import Interval, Part, Pose
+from .part import Interval, Part, Pose, Size
 
 AxisTaken = Literal["centred", "free"]
 RingAxis = Literal["centred", "free", "auto"]
+# No projector shows more, and rays to as many would fill the memory of who audits them.
+_Rings = Annotated[int, Field(ge=0, le=10_000)]
 
 
 def are_radii(radii: tuple[float, ...]) -> tuple[float, ...]:
@@ -35,8 +37,8 @@ def _rise(radii: tuple[float, ...]) -> bool:
 class CreasesRecord(Part):
     """Creases that a projector lights: their length and what rings cut off them."""
 
-    length_m: float
-    max_error_m: float
+    length_m: Size
+    max_error_m: Size
 
 
 class RingsRecord(Part):
@@ -55,9 +57,9 @@ class RingsRecord(Part):
 
     spacing: Literal["uniform", "curvature", "kept"]
     kept_even: bool
-    n_even: int
+    n_even: _Rings
     gap_m: Interval | None
-    over_tolerance: float
+    over_tolerance: Size
     creases: CreasesRecord
     left_out: Annotated[tuple[float, ...], AfterValidator(_left_out)] = ()
 

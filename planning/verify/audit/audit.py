@@ -56,6 +56,7 @@ from planning.verify.audit.stations.station_claims import audit_stations
 
 from .audit_case import N_SAMPLES, AuditCase, examine
 from .audit_findings import AuditFindings
+from .figure_claims import audit_check
 from .request_claims import audit_request
 
 _CLAIMS = (
@@ -97,6 +98,7 @@ _CLAIMS = (
     audit_request,
     audit_scales,
     audit_cost,
+    audit_check,
 )
 
 # Cameras alone: what is said of light and its patterns isn't there.
@@ -126,6 +128,7 @@ _CLAIMS_OF_VIEWS = (
     audit_request,
     audit_scales,
     audit_cost,
+    audit_check,
 )
 
 

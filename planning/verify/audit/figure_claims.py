@@ -6,7 +6,9 @@ from typing import cast
 
 from planning.model.document.check_records import ConfusionRecord, ReconstructionRecord
 from planning.model.document.part import Part
+from planning.model.requirements import CheckLimits
 
+from .audit_case import AuditCase
 from .audit_findings import AuditFindings
 
 _MM = 1e3
@@ -23,8 +25,8 @@ _REPEATABLE = {
 _FRACTION_SLACK = 0.025
 # Room light is a mean over projectors, which versions of libraries may round otherwise.
 _ROUNDING = 1e-9
-# What isn't a figure of the check: how it ended, and of which plan it was.
-_VERDICT = re.compile("passed|failures([.].*)?|plan|asked")
+# What follows from failures, and of which plan the check was.
+_VERDICT = re.compile("passed|plan|asked")
 # So many figures that differ are told.
 _MOST_TOLD = 8
 # Errors of parts of the surface are those of few points, and not compared.
@@ -79,8 +81,8 @@ def compare_exactly(
 ) -> list[str]:
     """Return where a recorded reconstruction isn't to the last digit one run again.
 
-    For what made it and its seed are the same: then so is every figure. What it says of
-    passing is another claim (`compare_figures`).
+    For what made it and its seed are the same: then so is every figure, and every word
+    of a failure. What it says of passing is another claim (`compare_figures`).
     """
     findings = AuditFindings("reconstruction")
     documents = (record.to_document() for record in (recorded, fresh))
@@ -142,6 +144,57 @@ def contradictions(
         whose = "the room light that the plan states"
         findings.same("ambient", recorded.ambient, ambient, whose, _ROUNDING)
     return list(findings.failures)
+
+
+def audit_check(case: AuditCase, findings: AuditFindings) -> None:
+    """Check that the failures of a recorded check are those that its figures say.
+
+    Each begins with the limit that isn't kept, in the order in which limits are looked
+    at; what follows are likely causes, which only a check again gives.
+    """
+    recorded = case.plan.document.reconstruction
+    if recorded is None:
+        return
+    clauses = _missed(recorded, case.plan.requirements.check)
+    told = recorded.failures
+    findings.holds(
+        len(told) == len(clauses) and all(map(str.startswith, told, clauses)),
+        "reconstruction.failures",
+        f"claimed {list(told)!r}, but by its figures and limits they are {clauses!r}",
+    )
+
+
+def _missed(recorded: ReconstructionRecord, limits: CheckLimits) -> list[str]:
+    """Return how each failure begins: the limit that the figures miss, and by what."""
+    rms, p95 = recorded.accuracy_rms_m, recorded.accuracy_p95_m
+    bias, missing = recorded.accuracy_bias_m, recorded.predicted_missing
+    if rms is None or p95 is None or bias is None:
+        return ["no point was measured"]
+    lengths = (
+        ("rms distance of the points from the mesh", rms, limits.max_rms_m),
+        ("95th percentile of the distance", p95, limits.max_p95_m),
+        ("mean signed distance", bias, limits.max_bias_m),
+    )
+    clauses = [
+        f"{name} is {_MM * value:.3f} mm, limit {_MM * limit:.3f} mm"
+        for name, value, limit in lengths
+        if abs(value) > limit
+    ]
+    if missing is None or len(recorded.completeness) < 2:
+        return clauses
+    row = recorded.completeness[1]
+    if row.fraction < limits.min_completeness:
+        clauses.append(
+            f"completeness is {row.fraction:.3f} of the target predicted measured at "
+            f"{_MM * row.threshold_m:.2f} mm, limit {limits.min_completeness:.3f}"
+        )
+    if missing > limits.max_predicted_missing:
+        clauses.append(
+            f"{100 * missing:.2f} % of the samples predicted measured have no point "
+            f"within {_MM * row.threshold_m:.2f} mm, limit "
+            f"{100 * limits.max_predicted_missing:.2f} %"
+        )
+    return clauses
 
 
 def _compare_shares(

@@ -111,7 +111,7 @@ def _audit_coverage(
     }
     cause = joined(actual.cause for actual, _ in parts)
     large, whole, n = region.id in case.large_regions, region.area_m2, len(cause)
-    fallen = case.plan.coverage.samples * whole / case.estimator.target_m2
+    fallen = case.plan.coverage.samples * min(whole / case.estimator.target_m2, 1.0)
     n_claimed = max(areas.samples, int(fallen), _CLAIMED if large else 0)
     unmeasured = whole - areas.measured_m2
     if areas.samples < 1:

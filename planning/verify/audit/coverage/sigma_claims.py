@@ -52,7 +52,11 @@ def audit_deviations(
     below.holds((claims.sigma is None) != measured, "", either)
     if claims.sigma is None or not n:
         return
-    claimed = int(claims.samples * claims.target.measured_m2 / claims.target.area_m2)
+    # An area that is false, which is told elsewhere, may be next to nothing.
+    whole, part = claims.target.area_m2, claims.target.measured_m2
+    claimed = (
+        int(claims.samples * float(np.clip(part / whole, 0.0, 1.0))) if whole else 0
+    )
     for name, share in _SHARES.items():
         for key, values in (
             (name, deviation(terms)),
