@@ -24,6 +24,7 @@ from .reduced_cover import ReducedCover
 
 # Bits of the largest price of a floor (`floors`).
 PRICE_BITS = 12
+# Words of columns that are looked at first, one by one.
 _SKETCH_WORDS = 4
 # Words of columns that are compared, some seconds; so many are reached beyond about
 # ten thousand columns.
@@ -165,7 +166,7 @@ def _undominated(
     order = np.lexsort((np.arange(n_sets), costs, -gains))
     order = order[gains[order] > 0]
     words = pack_shuffled(dense[:, order].T)
-    sketch = np.ascontiguousarray(words[:, :_SKETCH_WORDS])
+    sketch = words[:, :_SKETCH_WORDS]
     rivals_wanted = np.ones(order.size, dtype=np.int64)
     for need in np.unique(needs[needs > 1]):
         served = np.any(dense[needs == need], axis=0)
@@ -173,21 +174,29 @@ def _undominated(
 
     better = np.arange(order.size)
     standing = np.zeros(order.size, dtype=np.int64)
+    # What those that stand lack, word by word: few pass the first.
+    lacks = np.empty((sketch.shape[1], order.size), dtype=np.uint64)
+    costs, own = costs[order], own[order]
     n_standing, compared = 0, 0
     for j in range(order.size):
         # Whoever isn't compared any more stays: correct, but slower to search.
-        rivals = standing[: n_standing if compared < _MOST_COMPARED else 0]
-        compared += rivals.size * sketch.shape[1]
-        rivals = rivals[costs[order[rivals]] <= costs[order[j]]]
-        kind = own[order[rivals]]
-        rivals = rivals[(kind < 0) | (kind == own[order[j]])]
-        rivals = rivals[~np.any(sketch[j] & ~sketch[rivals], axis=1)]
+        n = n_standing if compared < _MOST_COMPARED else 0
+        compared += n * sketch.shape[1]
+        places = np.arange(n)
+        for lack, word in zip(lacks, sketch[j], strict=True):
+            # All of a row at once is quicker than the places of it.
+            some = lack[:n] if places.size == n else lack[places]
+            places = places[(some & word) == 0]
+        rivals = standing[places]
+        rivals = rivals[costs[rivals] <= costs[j]]
+        kind = own[rivals]
+        rivals = rivals[(kind < 0) | (kind == own[j])]
         compared += rivals.size * words.shape[1]
         rivals = rivals[~np.any(words[j] & ~words[rivals], axis=1)]
         if rivals.size >= rivals_wanted[j]:
             better[j] = rivals[0]
         else:
-            standing[n_standing] = j
+            standing[n_standing], lacks[:, n_standing] = j, ~sketch[j]
             n_standing += 1
     kept = np.sort(order[standing[:n_standing]]).astype(np.int64)
     stand_in = np.full(n_sets, -1, dtype=np.int64)

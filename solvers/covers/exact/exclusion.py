@@ -32,6 +32,9 @@ _FINE = 2.0**24
 # More makes a file that nobody wants to send.
 _MOST_MULTIPLIERS, _MOST_NODES = 2000, 200_000
 
+# Counts in single precision are exact up to here.
+_EXACT = 1 << 24
+
 
 @dataclass(frozen=True, eq=False)
 class Exclusion:
@@ -100,7 +103,7 @@ def _most_of_few(covers: NDArray[np.bool_], n_sets: int) -> int:
     counts = covers.sum(axis=0)
     if n_sets < LOOKED_AT or counts.size < LOOKED_AT:
         return int(counts.max(initial=0)) if n_sets else 0
-    ones = covers.astype(np.float64)
+    ones = covers.astype(np.float32 if len(covers) < _EXACT else np.float64)
     return int((counts[:, None] + counts[None, :] - ones.T @ ones).max())
 
 
