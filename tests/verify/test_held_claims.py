@@ -109,6 +109,17 @@ def test_fewer_cameras_are_proved_too_few_with_rings_as_written(short):
     assert found(short, again=None).failures == ()
 
 
+def test_a_target_of_next_to_no_area_is_false_and_no_crash(plan):
+    def tiny(document):
+        document["coverage"]["target"]["area_m2"] = 1e-308
+        document["regions"][0]["area_m2"] = 1e100
+        document["coverage"]["samples"] = 2**53
+
+    assert plan.coverage.sigma is not None
+    failures = found(forged(plan, tiny), again=None).failures
+    assert any(line.startswith("coverage.target.area_m2") for line in failures)
+
+
 def test_why_cameras_reach_too_little_comes_out_again(short):
     honest = found(short)
     assert honest.failures == ()
