@@ -62,8 +62,8 @@ def stages_of(
     free = [k for k, camera in enumerate(cameras) if not camera.station]
     planned_lit = lit[bright, :n_projectors]
     own = LitSamples.of(lamps[:n_projectors], samples.target, planned_lit)
-    some, theirs = ([of[k] for k in free] for of in (cameras, seen))
-    measured[:, free] = measured_by(scene, some, own, theirs)
+    some = [cameras[k] for k in free]
+    measured[:, free] = measured_by(scene, some, own, [seen[k] for k in free])
     cover = candidate_cover(scene, measured, samples, cameras)
     cover = replace(cover, n_existing=n_cameras)
     proof = unproved(cover, target.samples.weight).changed(given=0)
