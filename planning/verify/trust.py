@@ -179,11 +179,11 @@ def held_against_others(
     plan: RigPlan, over_poses: Sequence[PoseBound] | None = None
 ) -> tuple[str, ...]:
     """Return which claims of a plan the audit doesn't recompute, a line a kind."""
-    keys, lines = list(_keys(plan.to_document())), list[str]()
-    for what, patterns in ON_TRUST.items():
+    lines = list[str]()
+    for what, named in _named(plan, ON_TRUST).items():
         if what == OVER_POSES and over_poses is not None:
             lines += [bound.trusted for bound in over_poses if bound.trusted]
-        elif any(is_under(key, dict.fromkeys(patterns, what)) for key in keys):
+        elif named:
             lines.append(what)
     return tuple(lines)
 
@@ -224,12 +224,19 @@ def _of_check(plan: RigPlan, figures_held: str) -> tuple[str, ...]:
 
 def _told(plan: RigPlan, table: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
     """Return which claims of a table a plan makes, a line a kind with their keys."""
+    kinds = _named(plan, table).items()
+    return tuple(f"{what} ({', '.join(named)})" for what, named in kinds if named)
+
+
+def _named(
+    plan: RigPlan, table: Mapping[str, Sequence[str]]
+) -> Mapping[str, Sequence[str]]:
+    """Return of each kind of claims in a table those that a plan makes."""
     keys = list(_keys(plan.to_document()))
-    return tuple(
-        f"{what} ({', '.join(named)})"
+    return {
+        what: [p for p in patterns if any(is_under(k, {p: ""}) for k in keys)]
         for what, patterns in table.items()
-        if (named := [p for p in patterns if any(is_under(k, {p: ""}) for k in keys)])
-    )
+    }
 
 
 def _keys(value: Any, key: str = "") -> Iterator[str]:  # noqa: ANN401

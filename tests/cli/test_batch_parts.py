@@ -8,6 +8,7 @@ from pathlib import Path, PurePosixPath
 
 import pytest
 from click.testing import CliRunner
+from support.opencv_calibration import YAML
 
 from planning.cli.batch import part_task, runners
 from planning.cli.batch.part_task import PartEnd, PartTask, plan_part
@@ -37,20 +38,6 @@ CALIBRATED = """
 base = "default"
 [camera]
 calibration = {file}
-"""
-INTRINSICS = """%YAML:1.0
-image_width: 2048
-image_height: 1536
-camera_matrix: !!opencv-matrix
-   rows: 3
-   cols: 3
-   dt: d
-   data: [ {focal}, 0., 1024., 0., {focal}, 768., 0., 0., 1. ]
-distortion_coefficients: !!opencv-matrix
-   rows: 1
-   cols: 5
-   dt: d
-   data: [ 0., 0., 0., 0., 0. ]
 """
 
 
@@ -220,7 +207,8 @@ def test_a_calibration_goes_along_and_counts(tmp_path, reads):
     rig.write_text(CALIBRATED.format(file='"../cam.yml"'))
     asked = set()
     for focal in (2500.0, 2600.0):
-        (tmp_path / "cam.yml").write_text(INTRINSICS.format(focal=focal))
+        lens = YAML.replace("3.5124e+03", f"{focal}").replace("3511.9", f"{focal}")
+        (tmp_path / "cam.yml").write_text(lens)
         run(tmp_path / "part.obj", "-o", out, "--rig", rig)
         (row,) = rows(out)
         assert row["message"] == f"[{focal}, {focal}]"

@@ -8,6 +8,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 from click.testing import CliRunner
+from support.opencv_calibration import YAML
 
 from planning.cli.main import commands
 from planning.model.errors import RigError
@@ -22,24 +23,6 @@ PAGE = Path(__file__).parents[2] / "docs" / "reference" / "rig-files.md"
 SHIPPED = Path(__file__).parents[2] / "planning/rig/presets/rig.schema.json"
 FOCUS = "[camera.focus]\ndistance_mm = 1150\nf_number = 8\nblur_px = 2\n"
 NAMED = 'base = "default"\nname = "mine"\n[camera]\ndevice = "{}"\n' + FOCUS
-YAML = """%YAML:1.0
----
-calibration_time: "Mon Mar  3 10:21:08 2025"
-image_width: 2048
-image_height: 1536
-camera_matrix: !!opencv-matrix
-   rows: 3
-   cols: 3
-   dt: d
-   data: [ 3.5124e+03, 0., 1.0172e+03, 0., 3511.9, 771.8,
-       0., 0., 1. ]
-distortion_coefficients: !!opencv-matrix
-   rows: 1
-   cols: 5
-   dt: d
-   data: [ -0.081, 0.112, 3.0e-04, -2.0e-04, 0.5 ]
-avg_reprojection_error: 0.21
-"""
 XML = """<?xml version="1.0"?>
 <opencv_storage>
 <image_width>2048</image_width><image_height>1536</image_height>

@@ -21,14 +21,14 @@ from .index_page import NAME as INDEX
 from .index_page import write_index
 from .ledger import NAME, Row, asked_of, is_whole, read_rows, row_of, write_rows
 from .part_names import one_line
-from .part_task import PartEnd, PartTask, stop_parts
+from .part_task import NO_FILE, PartEnd, PartTask, stop_parts
 from .parts import Part, find_parts
 from .runners import cluster, local
 from .sent_files import part_files, rig_files
 
 _INTERRUPTED = 130
-# Of parts whose files can't be read or written, and of those whose plan is none.
-_NO_FILE, _NO_PLAN = 2, -1
+# Of parts whose plan is none.
+_NO_PLAN = -1
 
 
 @dataclass(eq=False)
@@ -68,7 +68,7 @@ class _Batch:
             try:
                 task = self.task(part)
             except (PlanningError, OSError) as error:
-                code = getattr(error, "exit_code", _NO_FILE)
+                code = getattr(error, "exit_code", NO_FILE)
                 self.end(PartEnd(part.name, code, one_line(str(error)), 0.0, {}))
                 continue
             asked = self.asked[part.name] = asked_of(task, code_content())
@@ -88,7 +88,7 @@ class _Batch:
             row = row_of(end, part.folder, self.out, asked)
         except (PlanningError, OSError) as error:
             # A full disk, or whatever a worker sent: the others go on.
-            code = _NO_FILE if isinstance(error, OSError) else _NO_PLAN
+            code = NO_FILE if isinstance(error, OSError) else _NO_PLAN
             failed = replace(end, code=code, message=one_line(str(error)))
             row = row_of(failed, "", self.out, "")
         self.rows[end.name] = row

@@ -24,8 +24,8 @@ _TIMES = 2
 _PLAN = "from planning.cli.main import main; main()"
 # Folders of its own for each, so that no file's name is in another's way.
 _MESH, _RIG, _OUT = "part", "rig", "plan"
-# Of an end for which no run's exit code speaks: as of every file that can't be written.
-_NOT_RUN = 2
+# Exit code of a part whose files can't be read or written, and of no run's.
+NO_FILE = 2
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def plan_part(task: PartTask) -> PartEnd:
                 if path.is_file()
             }
     except (PlanningError, OSError) as error:
-        code, message = _NOT_RUN, one_line(str(error))
+        code, message = NO_FILE, one_line(str(error))
     return PartEnd(task.name, code, message, time.monotonic() - begin, files)
 
 

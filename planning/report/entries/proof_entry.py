@@ -158,13 +158,10 @@ def _frozen(
     """
     own = set(map(bytes, samples.samples.points))
     for draws in tried:
-        drawn = [(d, every, scene.target_samples(d).samples) for d, every in draws]
+        targets = [(d, every, scene.target_samples(d).samples) for d, every in draws]
+        drawn = [(d, n, s.points[::n], s.faces[::n]) for d, n, s in targets]
         # One that confirmed, before floors were asked for, has joined nothing.
-        drawn = [
-            (d, every, s.points[::every], s.faces[::every])
-            for d, every, s in drawn
-            if not own.isdisjoint(map(bytes, s.points[::every]))
-        ]
+        drawn = [one for one in drawn if not own.isdisjoint(map(bytes, one[2]))]
         place = {bytes(p): i for i, p in enumerate(chain(*(s[2] for s in drawn)))}
         where = [place.get(bytes(point)) for point in samples.samples.points]
         known = [i for i in where if i is not None]

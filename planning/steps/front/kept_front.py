@@ -2,12 +2,9 @@
 
 import hashlib
 import json
-import zipfile
-import zlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from tokenize import TokenError
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -19,6 +16,7 @@ from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.errors import InputError, PlanFileError
 from planning.model.files import reading
 from planning.model.front import Front, FrontPoint
+from planning.model.surface import DAMAGED
 from planning.projectors.candidate_set import CandidateSet
 from planning.report.partial_plan import Prepared
 from planning.scene.draws import DRAWS
@@ -31,10 +29,6 @@ _FORMAT, _VERSION = "ringrig-front", 1
 _ARRAYS = (
     *("stages", "seen", "projector_poses", "projector_rings", "projector_models"),
     *("camera_poses", "camera_models", "point_rings"),
-)
-_DAMAGED = (
-    *(ValueError, KeyError, TypeError, EOFError, NotImplementedError, TokenError),
-    *(zipfile.BadZipFile, zlib.error),
 )
 _AGAIN = "make the front again with --pareto"
 
@@ -168,7 +162,7 @@ def read_front(folder: Path) -> KeptFront:
             _hold_together(arrays)
             known = head["format"], head["version"]
             kept = KeptFront(Front(**head["front"]), dict(head["digests"]), arrays)
-        except _DAMAGED as error:
+        except (ValueError, KeyError, *DAMAGED) as error:
             what = "a field" if isinstance(error, ValidationError) else str(error)
             raise PlanFileError(
                 f"{path}: is no front, or a damaged one ({what}); {_AGAIN}"

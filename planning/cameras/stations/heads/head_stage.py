@@ -57,13 +57,14 @@ def stages_of(
     samples = LitSamples.of(lamps, target.take(bright), lit[bright])
     views = CandidateViews(scene, cameras)
     seen = views.on(samples.target)
-    measured = measured_by(scene, cameras, samples, seen)
     # One without a station would measure with projectors of the reference set, too.
-    free = [k for k, camera in enumerate(cameras) if not camera.station]
     planned_lit = lit[bright, :n_projectors]
     own = LitSamples.of(lamps[:n_projectors], samples.target, planned_lit)
-    some = [cameras[k] for k in free]
-    measured[:, free] = measured_by(scene, some, own, [seen[k] for k in free])
+    measured = np.zeros((len(bright), len(cameras)), dtype=bool)
+    for stationed, by in ((True, samples), (False, own)):
+        some = [k for k, c in enumerate(cameras) if bool(c.station) is stationed]
+        those, theirs = [cameras[k] for k in some], [seen[k] for k in some]
+        measured[:, some] = measured_by(scene, those, by, theirs)
     cover = candidate_cover(scene, measured, samples, cameras)
     cover = replace(cover, n_existing=n_cameras)
     proof = unproved(cover, target.samples.weight).changed(given=0)

@@ -91,8 +91,7 @@ def _audit_spacing(
     )
     if not findings.holds(count >= 2, "n_even", f"{count!r} must be at least 2 rings"):
         return
-    every = np.sort(np.concatenate([projector.radii, rings.left_out]))
-    even = float(every[-1]) * np.arange(1, count + 1) / count
+    every, even = _every_and_even(rings, projector)
     findings.holds(
         spacing != "uniform"
         or (
@@ -127,12 +126,19 @@ def audit_left_out(case: AuditCase, findings: AuditFindings) -> None:
         rings = record.rings
         if rings is None or not rings.left_out:
             continue
-        left_out = np.array(rings.left_out)
-        every = np.sort(np.concatenate([projector.radii, left_out]))
-        even = float(every[-1]) * np.arange(1, rings.n_even + 1) / rings.n_even
+        every, even = _every_and_even(rings, projector)
         grid = cast_rings(case, projector, _rows(even))
-        below = findings.at(f"{record.id}.rings")
+        left_out, below = np.array(rings.left_out), findings.at(f"{record.id}.rings")
         _audit_idle(every, left_out, grid, case, below, hidden_alone=True)
+
+
+def _every_and_even(
+    rings: RingsRecord, projector: AuditProjector
+) -> tuple[Array, Array]:
+    """Return all rings, shown or left out, and as far as they reach the even ones."""
+    every = np.sort(np.concatenate([projector.radii, rings.left_out]))
+    even = float(every[-1]) * np.arange(1, rings.n_even + 1) / rings.n_even
+    return every, even
 
 
 def _rows(even: Array) -> Array:
