@@ -45,14 +45,23 @@ def prove_fewest(
     source = CandidateSource(scene, templates)
     while stage.certificate.needed.count > stage.certificate.given:
         bound = bound_of(scene, stage, templates, effort)
+        if bound is None:
+            break
         better = _better(source, stage, bound, effort) if joining else stage
         if better is stage:
-            certificate = joined(stage.certificate, bound.proof())
-            refutation = bound.refutation()
-            return replace(stage, certificate=certificate, refutation=refutation)
+            return with_bound(stage, bound)
         stage = better
-    n_reached = int(stage.candidates.reached.sum())
-    return replace(stage, certificate=with_existing_alone(stage.certificate, n_reached))
+    return with_bound(stage, None)
+
+
+def with_bound(stage: ProjectorStage, bound: ContinuousBound | None) -> ProjectorStage:
+    """Return the stage with a bound in its certificate, of `bound_of`."""
+    before = stage.certificate
+    if bound is None:
+        n_reached = int(stage.candidates.reached.sum())
+        return replace(stage, certificate=with_existing_alone(before, n_reached))
+    certificate = joined(before, bound.proof())
+    return replace(stage, certificate=certificate, refutation=bound.refutation())
 
 
 def _better(
@@ -95,8 +104,11 @@ def bound_of(
     stage: ProjectorStage,
     templates: tuple[PlannedProjector, ...],
     effort: Effort,
-) -> ContinuousBound:
-    """Bound the projectors of a stage over every pose of the workspace."""
+) -> ContinuousBound | None:
+    """Bound the projectors of a stage over every pose of the workspace.
+
+    None where existing ones may light all that is reached of the first samples.
+    """
     # The first samples are a draw of their own; the others came where it overfitted.
     samples = stage.candidates.samples
     n = min(len(samples), effort.most_samples or len(samples))
@@ -111,6 +123,8 @@ def bound_of(
         RegionFloors.of(scene, samples.take(np.arange(n))),
     )
     wanted = np.flatnonzero(reached & ~free)
+    if not wanted.size:
+        return None
     return bound_projectors(
         scene,
         templates,

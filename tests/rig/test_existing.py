@@ -208,6 +208,19 @@ def test_the_fewest_over_all_poses_count_those_that_are_given(existing, count, i
     assert not any(p.existing for p in stage.reference[len(existing) :])
 
 
+def test_nothing_is_proved_where_no_sample_of_the_first_draw_is_reached():
+    scene, template = ball_scene([])
+    stage = plan_projectors(scene, (template,), 300, rounds=1)
+    stages = stage.candidates.stages.copy()
+    stages[:100] = 0
+    dark = replace(stage, candidates=replace(stage.candidates, stages=stages))
+    effort = Effort(finest=6, maps=6, budget=1e9, shadows=0.0, most_samples=100)
+    entry = prove_fewest(scene, dark, (template,), effort).certificate.continuous
+    assert (entry.lower_bound, entry.n_cells) == (0, 0)
+    assert entry.proof.startswith("no sample of the first draw")
+    assert entry.n_reached == dark.candidates.reached.sum() > 0
+
+
 # ---- a whole plan
 
 

@@ -18,9 +18,8 @@ from planning.model.document.family_records import (
 )
 from planning.model.progress import Stopwatch
 from planning.projectors.projector_stage import ProjectorStage
-from planning.projectors.proved_projectors import bound_of
+from planning.projectors.proved_projectors import bound_of, with_bound
 from planning.proofs import camera_bound, projector_bound
-from planning.proofs.all_poses import joined
 from planning.report.partial_plan import PartialPlan
 from planning.scene.draws import DRAWS
 
@@ -64,8 +63,7 @@ class FamilyProofs:
             ready, stage = family.members[member], self.needs[member].projectors
             effort = projector_bound.PROVE if prove else projector_bound.DEFAULT
             bound = bound_of(ready.scene, stage, ready.templates, effort)
-            proof = joined(stage.certificate, bound.proof())
-            return replace(stage, certificate=proof)
+            return with_bound(stage, bound)
 
         def of_cameras(member: int) -> CameraStage:
             stage = self.needs[member].cameras
