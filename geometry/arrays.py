@@ -32,7 +32,7 @@ def lengths(vectors: Array) -> Array:
     To the last bit what `np.linalg.norm` gives along the last axis, whose sums over
     rows of three cost five times as much, and up to thirty.
     """
-    first, *others = np.moveaxis(vectors, -1, 0)
+    first, *others = vectors.T if vectors.ndim < 3 else np.moveaxis(vectors, -1, 0)
     square = first * first
     for other in others:
         square += other * other

@@ -3,8 +3,9 @@
 Keys are dotted, `*` stands for any name or number; a key stands for all below it.
 """
 
-from collections.abc import Mapping
-from fnmatch import fnmatchcase
+import re
+from collections.abc import Iterable, Mapping
+from functools import cache
 from typing import Any
 
 NO_CLAIM = {
@@ -37,14 +38,16 @@ NO_CLAIM = {
 }
 
 
-def is_under(key: str, patterns: Mapping[str, str]) -> bool:
+def is_under(key: str, patterns: Iterable[str]) -> bool:
     """Return whether a key is one of the patterns, or below one."""
-    parts = key.split(".")
-    return any(
-        fnmatchcase(".".join(parts[:n]), pattern)
-        for pattern in patterns
-        for n in range(1, len(parts) + 1)
-    )
+    return _any_of(tuple(patterns)).match(key) is not None
+
+
+@cache
+def _any_of(patterns: tuple[str, ...]) -> re.Pattern[str]:
+    """Compiled, as keys by the thousand are asked about."""
+    either = "|".join(re.escape(one).replace(r"\*", ".*") for one in patterns)
+    return re.compile(rf"(?:{either})(?:\.|\Z)", re.DOTALL)
 
 
 def claims_alone(value: Any, key: str = "") -> Any:  # noqa: ANN401
@@ -54,7 +57,7 @@ def claims_alone(value: Any, key: str = "") -> Any:  # noqa: ANN401
         return {
             name: claims_alone(part, named[name])
             for name, part in value.items()
-            if not any(fnmatchcase(named[name], pattern) for pattern in NO_CLAIM)
+            if not is_under(named[name], NO_CLAIM)
         }
     if isinstance(value, list):
         return [claims_alone(part, f"{key}.{i}") for i, part in enumerate(value)]

@@ -115,7 +115,7 @@ def is_trusted(key: str) -> bool:
     files = ("sha256", "unit", "scale_to_m", "n_vertices", "n_faces", "repairs")
     own = ("made_with", *(f"meshes.*.{name}" for name in files))
     patterns = (*(p for parts in ON_TRUST.values() for p in parts), *own)
-    return is_under(key, dict.fromkeys(patterns, ""))
+    return is_under(key, patterns)
 
 
 def taken_on_trust(
@@ -234,7 +234,7 @@ def _named(
     """Return of each kind of claims in a table those that a plan makes."""
     keys = list(_keys(plan.to_document()))
     return {
-        what: [p for p in patterns if any(is_under(k, {p: ""}) for k in keys)]
+        what: [p for p in patterns if any(is_under(key, (p,)) for key in keys)]
         for what, patterns in table.items()
     }
 

@@ -132,6 +132,8 @@ def _own(member: RigPlan) -> str:
     lights = proofs.projectors
     if lights is None or lights.alone is None or proofs.cameras.alone is None:
         return ""
+    if not proofs.cameras.alone:
+        return "out of reach"
     return f"{lights.alone} + {proofs.cameras.alone}"
 
 

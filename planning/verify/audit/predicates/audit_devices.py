@@ -35,8 +35,10 @@ def _ball(points: Array) -> tuple[Array, float]:
     Badoiu and Clarkson, "Smaller core-sets for balls", 2003.
     """
     centre = points.mean(axis=0)
+    squares = np.sum(points**2, axis=1)
     for step in range(2, _BALL_STEPS):
-        far = points[np.argmax(np.sum((points - centre) ** 2, axis=1))]
+        # |p - c|^2 but for |c|^2, which is the same for all.
+        far = points[np.argmax(squares - 2.0 * (points @ centre))]
         centre = centre + (far - centre) / step
     return centre, float(np.sqrt(np.sum((points - centre) ** 2, axis=1).max()))
 
