@@ -4,6 +4,9 @@ import csv
 import os
 import shutil
 import signal
+import subprocess
+import sys
+import time
 from dataclasses import replace
 
 import pytest
@@ -205,6 +208,32 @@ def test_a_process_that_is_killed_is_begun_again_and_then_told(monkeypatch, tmp_
     assert end.code == -signal.SIGKILL
     assert "killed by signal 9, 2 times" in end.message
     assert count.read_text() == "xx"
+
+
+# A part that begins and stays, in a process that plans nothing else.
+STAYS = """
+from planning.cli.batch import part_task
+before, _ = part_task._PLAN.split("from planning.cli.main")
+part_task._PLAN = before + "open('begun', 'w'); import time; time.sleep(300)"
+part_task.plan_part(part_task.PartTask("a.stl", {"a.stl": b""}, {}, (), 1))
+"""
+
+
+def test_a_batch_that_is_killed_leaves_no_part_and_no_folder_behind(tmp_path):
+    found = {"TMPDIR": str(tmp_path), "PYTHONPATH": found_path()}
+    batch = subprocess.Popen([sys.executable, "-c", STAYS], env=os.environ | found)
+    assert soon(lambda: list(tmp_path.glob("ringrig-*/part/begun")))
+    batch.kill()
+    batch.wait()
+    assert soon(lambda: not list(tmp_path.iterdir()))
+
+
+def soon(holds):
+    """Whether something holds within a minute."""
+    ends = time.monotonic() + 60.0
+    while not holds() and time.monotonic() < ends:
+        time.sleep(0.05)
+    return holds()
 
 
 def test_a_table_is_read_as_it_was_written(done, tmp_path):

@@ -21,7 +21,10 @@ from .part_names import one_line
 
 # Times that a part is begun whose process was killed.
 _TIMES = 2
-_PLAN = "from planning.cli.main import main; main()"
+_PLAN = (
+    "import sys; from planning.cli.batch.orphans import end_with_parent; "
+    "end_with_parent(sys.argv.pop(1)); from planning.cli.main import main; main()"
+)
 # Folders of its own for each, so that no file's name is in another's way.
 _MESH, _RIG, _OUT = "part", "rig", "plan"
 # Exit code of a part whose files can't be read or written, and of no run's.
@@ -108,7 +111,7 @@ def _planned(task: PartTask, place: Path) -> tuple[int, str]:
     words += ["--threads", str(task.threads)]
     code, message = -int(signal.SIGKILL), ""
     for _ in range(_TIMES):
-        code, message = _run([sys.executable, "-c", _PLAN, *words], here)
+        code, message = _run([sys.executable, "-c", _PLAN, str(place), *words], here)
         if code >= 0 or _stopped.is_set():
             # Nobody knows the folder that its rig file was in here.
             return code, message.replace(beside, "")
@@ -122,23 +125,27 @@ def _run(command: Sequence[str], place: Path) -> tuple[int, str]:
     # The package that this is, wherever it was imported from.
     home = str(Path(__file__).parents[3])
     paths = [home, *filter(None, [os.environ.get("PYTHONPATH")])]
-    process = subprocess.Popen(
-        command,
-        cwd=place,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(paths)},
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    _running.add(process)
-    try:
-        _, said = process.communicate()
-    finally:
-        _running.discard(process)
-        # Whatever came in between: no part is left behind.
-        process.kill()
-        process.wait()
+    theirs, ours = os.pipe()
+    # Where this process is killed, nobody holds it open any more.
+    with open(ours, "wb"):
+        with open(theirs, "rb") as held:
+            process = subprocess.Popen(
+                command,
+                cwd=place,
+                env=os.environ | {"PYTHONPATH": os.pathsep.join(paths)},
+                stdin=held,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
+                text=True,
+            )
+        _running.add(process)
+        try:
+            _, said = process.communicate()
+        finally:
+            _running.discard(process)
+            # Whatever came in between: no part is left behind.
+            process.kill()
+            process.wait()
     lines = said.strip().splitlines()
     return process.returncode, lines[-1].removeprefix("plan: ") if lines else ""
 
