@@ -1,35 +1,28 @@
-"""Count cameras by drops, by drops and turns, by the baseline program and by the cover.
+"""Count cameras by the baseline program, without its rows of (10), and by the cover.
 
 Usage: python -m benchmarks.paper.baseline_ablation [NAME ...]
-(from a checkout with its history)
+(ringrig installed, from a checkout)
 
 Twelve meshes (the sample, and those of `../shared/data/meshes` but the scan of 1.16
 million faces), shapes whose section is simple, and rigs whose small image the object
 overflows. The projectors are planned once; every way gets them, 1,500 samples and the
 same candidates.
 
-- Drops, turns: the paper's route as it was up to commit OLD, from rings of the closed
-  forms: cameras dropped only; holes closed by turns of 3, 8 and 18 degrees and moves to
-  the limit (10), too. Its code is taken from the history into a temporary folder.
 - Program: the route as it is. It stops because the bound over all poses says that no
   fewer are enough, or with so many samples of those required that the best of one
   fewer were found to measure. Without (10): the same with no seam in its programs.
-- Cover: the fewest candidates, and with poses at the limit (10) of its own cameras
-  among them, as up to OLD. Least: what is proved over candidates, and over all poses.
+- Cover: the fewest candidates. Least: what is proved over candidates, over all poses.
 - Closed form, axes square to the surface: floor(f L / 2C) + 1 of a wall, floor(f pi /
   eta) + 1 of a tube, f the share that is required, from as far as cameras may stand.
 
-Seconds are of processor time: drops, turns, program, cover, bound over all poses.
+Seconds are of processor time: program, cover, bound over all poses.
 """
 
-import json
-import os
-import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +34,7 @@ from geometry.curvature.refinement import cut_for_curvature
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import sphere
 from planning import load_mesh, load_rig
-from planning.cameras.camera_baselines import BaselineSamples, baseline_limits
+from planning.cameras.camera_baselines import BaselineSamples
 from planning.cameras.camera_cover import camera_candidate_views, measured_of
 from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.progress import Stopwatch
@@ -54,7 +47,6 @@ from planning.scene.measuring.measured import LitSamples, taken
 from planning.scene.scene import Scene
 from planning.steps.prepare import prepared
 
-OLD = "14fa3fda"
 ROOT = Path(__file__).resolve().parents[2]
 _SAMPLES = Draw(1500, 200)
 _PROJECTORS = 3
@@ -64,13 +56,10 @@ _SMALL = (
 _HEAD = (
     "object",
     "projectors",
-    "drops",
-    "turns",
     "program",
     "stops",
     "without (10)",
     "cover",
-    "with poses at (10)",
     "closed form",
     "least, candidates",
     "least, all poses",
@@ -119,51 +108,27 @@ class Case:
 
 
 def main() -> int:
-    """Print the table; return 1 if the program needs more than drops and turns."""
-    if sys.argv[1:2] == ["--old"]:
-        return _old(Path(sys.argv[2]), sys.argv[3])
+    """Print the table."""
     names = ["face.obj", *(m.path.name for m in shared_meshes.MESHES[1:])]
     names = sys.argv[1:] or [*names, *_SHAPES, *_OVERFLOWING]
     print(f"{machine()}\n")
     print(f"| {' | '.join(_HEAD)} |\n|{len(_HEAD) * '---|'}", flush=True)
-    worse = 0
-    with tempfile.TemporaryDirectory() as folder:
-        tree = Path(folder) / "tree"
-        tree.mkdir()
-        archive = subprocess.run(
-            ["git", "archive", OLD], cwd=ROOT, check=True, stdout=subprocess.PIPE
-        )
-        subprocess.run(["tar", "x"], cwd=tree, input=archive.stdout, check=True)
-        for name in names:
-            cells, fewer = _row(name, tree)
-            worse += not fewer
-            print(f"| {' | '.join(cells)} |", flush=True)
-    return int(worse > 0)
+    for name in names:
+        print(f"| {' | '.join(_row(name))} |", flush=True)
+    return 0
 
 
-def _row(name: str, tree: Path) -> tuple[list[str], bool]:
-    """The cells of an object, and whether the program needs no more than turns."""
+def _row(name: str) -> list[str]:
     rig, ready = _prepared(name)
     case = _case(rig, ready, _planned(ready))
-    seen = tree.parent / "projectors.npz"
-    np.savez(
-        seen,
-        device=[p.world_from_device for p in case.projectors],
-        ring=[p.world_from_ring for p in case.projectors],
-        radii=np.array([*(p.ring_radii for p in case.projectors), None], object)[:-1],
-    )
-    before = _before(name, tree, seen)
-    assert before["measured"] == int(case.measured.sum()), "the old tree sees another"
     (by_program, stops), seconds = _timed(lambda: _by_program(case))
     cover, least, cover_seconds = _by_cover(case)
     everywhere, bound_seconds = _timed(lambda: _bound(case, cover))
-    spent = [*before["seconds"], seconds, cover_seconds, bound_seconds]
-    counts = [before["drops"], before["turns"], by_program]
-    cells = [name, str(len(case.projectors)), *map(_count, counts), stops]
+    spent = seconds, cover_seconds, bound_seconds
+    cells = [name, str(len(case.projectors)), _count(by_program), stops]
     cells += [_count(_without_seams(case)), str(cover)]
-    cells += [_count(before["limit"]), _closed_form(name, case), str(least)]
-    cells += [str(everywhere), " / ".join(f"{s:.1f}" for s in spent)]
-    return cells, (by_program or 99) <= (before["turns"] or 99)
+    cells += [_closed_form(name, case), str(least)]
+    return [*cells, str(everywhere), " / ".join(f"{s:.1f}" for s in spent)]
 
 
 def _prepared(name: str) -> tuple[Rig, Prepared]:
@@ -188,9 +153,7 @@ def _from_file(name: str) -> tuple[TriangleMesh, str | None]:
         return load_mesh(ROOT / name), None
     (mesh,) = (m for m in shared_meshes.MESHES if m.path.name == name)
     up = mesh.words[mesh.words.index("--up") + 1] if "--up" in mesh.words else None
-    # The old tree lies elsewhere: the folder is the one beside this checkout.
-    path = ROOT.parent / "shared" / "data" / "meshes" / name
-    return load_mesh(path, **mesh.options), up
+    return load_mesh(mesh.path, **mesh.options), up
 
 
 def _planned(ready: Prepared) -> tuple[PlannedProjector, ...]:
@@ -283,78 +246,6 @@ def _closed_form(name: str, case: Case) -> str:
         eta = round_body_limit(0.15, away, theta, alpha).half_angle
         return str(int(share * np.pi // eta) + 1)
     return ""
-
-
-def _before(name: str, tree: Path, projectors: Path) -> dict[str, Any]:
-    """What the code of OLD finds for the same projectors."""
-    done = subprocess.run(
-        [sys.executable, __file__, "--old", str(projectors), name],
-        cwd=tree,
-        env=os.environ | {"PYTHONPATH": f"{tree}{os.pathsep}{tree / 'tests'}"},
-        stdout=subprocess.PIPE,
-        text=True,
-        check=True,
-    )
-    return json.loads(done.stdout.splitlines()[-1])
-
-
-def _old(projectors: Path, name: str) -> int:
-    """Print what the code of OLD, which is the one imported here, finds."""
-    from planning.cameras.baselines.limit_poses import limit_poses
-
-    from planning.cameras.baselines.widest_baselines import WidestBaselines
-    from planning.cameras.camera_cover import candidate_cover
-    from planning.cameras.paper import one_fewer_camera, paper_cameras, paper_route
-    from planning.proofs.selection import fewest_count, select_fewest
-    from planning.scene.measuring.measured import measured_by
-
-    rig, ready = _prepared(name)
-    saved = np.load(projectors, allow_pickle=True)
-    frames = zip(saved["device"], saved["ring"], saved["radii"], strict=True)
-    case = _case(
-        rig,
-        ready,
-        tuple(
-            replace(
-                ready.templates[0],
-                world_from_device=device,
-                world_from_ring=ring,
-                ring_radii=np.array(radii, dtype=np.float64),
-            )
-            for device, ring, radii in frames
-        ),
-    )
-    on = BaselineSamples(case.scene, case.projectors, case.samples)
-    cover = candidate_cover(case.scene, case.measured)
-    stated = paper_cameras._route_problem(on, case.candidates, cover.required)
-
-    def stay(cameras: Sequence[PlannedCamera]) -> WidestBaselines:
-        return WidestBaselines(tuple(cameras), stated.together(cameras), None, None)
-
-    problem = replace(stated, widen=stay)
-    closed, swept = one_fewer_camera._closed, paper_route.swept
-    told: dict[str, Any] = {"measured": int(case.measured.sum()), "seconds": []}
-    for way, turns in (("drops", False), ("turns", True)):
-        one_fewer_camera._closed = closed if turns else lambda _, placed: placed
-        paper_route.swept = swept if turns else lambda _, placed: placed
-        route, seconds = _timed(lambda: paper_route.paper_route(problem))
-        enough = route.cameras.count >= cover.required
-        told[way] = len(route.cameras.cameras) if enough else None
-        told["seconds"].append(seconds)
-    chosen = select_fewest(cover).chosen
-    limit = limit_poses(
-        [case.candidates.cameras[i] for i in chosen],
-        on.surface,
-        case.measured[:, chosen],
-        baseline_limits(case.scene),
-    )
-    both = case.measured
-    if limit:
-        theirs = measured_by(case.scene, limit, case.samples)
-        both = np.concatenate([case.measured, theirs], axis=1)
-    told["limit"] = fewest_count(replace(cover, covers=both))
-    print(json.dumps(told))
-    return 0
 
 
 def _timed(work: Callable[[], Any]) -> tuple[Any, float]:
