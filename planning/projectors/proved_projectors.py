@@ -76,6 +76,10 @@ def _better(
     count = stage.certificate.needed.count
     if better is not stage or bound.proof().lower_bound >= count:
         return better
+    allowed = source.scene.requirements.max_projectors
+    if allowed is not None and count - 1 > allowed:
+        # One fewer is still more than there may be.
+        return stage
     offer = ProjectorOffer(source, stage.candidates)
     found = free_devices(offer, count - 1, effort.starts)
     return _with_more(stage, found) if found else stage

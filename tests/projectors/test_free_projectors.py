@@ -130,3 +130,10 @@ def test_two_projectors_light_a_cross_for_which_candidates_need_three(monkeypatc
         needed, bound = proved.certificate.needed, proved.certificate.continuous
         found.append((needed.count, bound.lower_bound))
     assert found == [(3, 2), (2, 2)]
+
+    # Nobody looks for two where there may be one.
+    one = replace(offer.scene.requirements, max_projectors=1)
+    scene = replace(offer.scene, requirements=one)
+    stage = replace(stage, candidates=replace(offer, scene=scene))
+    proved = prove_fewest(scene, stage, source.templates, effort)
+    assert proved.certificate.needed.count == 3
