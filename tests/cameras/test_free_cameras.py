@@ -155,6 +155,7 @@ def planned():
     )
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("_few_poses")
 def test_a_plan_takes_fewer_cameras_than_its_candidates_need(monkeypatch):
     """Its poses join the candidates, over which the count is proved and audited."""
@@ -172,6 +173,7 @@ def test_a_plan_takes_fewer_cameras_than_its_candidates_need(monkeypatch):
     assert "one moved at a time" in with_.routes.why
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("_few_poses")
 def test_fewer_cameras_that_a_plan_denies_are_not_sought_again(monkeypatch):
     """One more is taken then, which fewer were found beside, over and over."""

@@ -31,6 +31,7 @@ def plates() -> TriangleMesh:
     return joined(*placed)
 
 
+@pytest.mark.long
 def test_fewer_cameras_are_never_said_to_measure_more(tmp_path, little_work):
     """Four that measure twice leave out a plate; three that measure once don't."""
     path = tmp_path / "few.toml"

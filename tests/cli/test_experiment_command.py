@@ -28,6 +28,7 @@ def run(*arguments: str):
     return CliRunner().invoke(commands, ["reconstruct", *arguments])
 
 
+@pytest.mark.long
 def test_an_experiment_writes_figures_cloud_and_numbers(tmp_path):
     folder = tmp_path / "out"
     found = run(

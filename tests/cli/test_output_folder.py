@@ -137,6 +137,7 @@ def test_this_system_exchanges_folders_in_one_step(tmp_path):
     assert (one / "name").read_text() == "other"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("late", [True, False])
 def test_a_plan_that_comes_too_late_leaves_the_one_before(handmade, tmp_path, late):
     """Whole, patterns and picture too; in time it takes its place."""

@@ -19,6 +19,8 @@ from planning.model.errors import InputError
 from planning.model.plan import RigPlan
 from planning.verify.held_figures import WHOLLY, hold_claims
 
+pytestmark = pytest.mark.long
+
 WORDS = "--mesh head.obj --rig few.toml --max-projectors 3 --cameras-by cover"
 
 

@@ -91,6 +91,7 @@ def watch(tmp_path, small_job):
         run.kill()
 
 
+@pytest.mark.long
 def test_a_rig_file_that_is_saved_is_planned_again_and_what_changed_is_told(watch):
     run, rig, until = watch
     text = rig.read_text()

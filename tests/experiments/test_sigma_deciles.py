@@ -22,6 +22,7 @@ def found(table):
     return flat, ball
 
 
+@pytest.mark.long
 def test_errors_are_s_n_in_every_decile_of_conditioning(found):
     flat, ball = found
     assert np.degrees(ball.off_axis.max()) > 30.0

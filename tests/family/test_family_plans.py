@@ -105,6 +105,7 @@ def test_a_member_that_is_short_of_devices_says_what_it_takes(rig, few):
         assert verify_plan(member, check_pixels=False).failures == ()
 
 
+@pytest.mark.long
 def test_members_say_that_bounds_leave_out_bodies_of_chosen_devices(few, tmp_path):
     path = tmp_path / "bodied.toml"
     body = "[camera.body]\nsize_mm = [60, 60, 120]\ncentre_mm = [0, 0, -61]\n"
@@ -171,6 +172,7 @@ def test_a_member_may_be_verified_by_itself(kept):
     assert verify_plan(member, check_pixels=False, threads=1).failures == ()
 
 
+@pytest.mark.long
 def test_one_seed_one_plan_whatever_the_threads(rig, few):
     once, again = (
         plan_rig(
@@ -339,6 +341,7 @@ def run(*words):
     return CliRunner().invoke(commands, [str(word) for word in words])
 
 
+@pytest.mark.long
 def test_a_folder_and_a_pattern_name_the_same_members(few, folder):
     out, given = folder / "out", "parts/*"
     whole = [{"meshes": (str(folder / one),), **_NOTHING} for one in ("parts", given)]

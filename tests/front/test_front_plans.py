@@ -127,6 +127,7 @@ def test_what_is_kept_is_what_candidates_light_and_see(kept, folder, mesh, rig):
     assert again.seen.any()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("count", [(1, 2), (2, 3)])
 def test_a_taken_point_claims_what_the_front_said_without_a_matrix(
     count, folder, mesh, rig, monkeypatch
@@ -188,6 +189,7 @@ def test_a_changed_mesh_rig_seed_or_requirement_is_refused_by_name(folder, mesh,
     assert front.matrix(ready_for(mesh, rig, max_cameras=9)).seen.any()
 
 
+@pytest.mark.long
 def test_the_same_front_with_any_number_of_threads(kept, mesh, rig):
     again = plan_front(mesh, rig, WISHES, threads=2)
     files = [io.BytesIO(), io.BytesIO()]

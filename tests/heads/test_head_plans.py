@@ -120,6 +120,7 @@ def test_a_head_that_holds_nothing_is_refused(plan, handmade):
         handmade.tampered(plan, lambda d: d["rig"]["head"].update(devices=[]))
 
 
+@pytest.mark.long
 def test_cameras_of_heads_that_cross_measure_with_no_projector_but_the_plans(few):
     """Beside heads of the reference set they would, and claim to cover all that is lit.
 
@@ -152,6 +153,7 @@ def test_a_pair_across_heads_measures_nothing(plan, handmade):
     assert (across.pairs > alone.pairs).any()
 
 
+@pytest.mark.long
 def test_stations_of_one_head_are_in_the_order_of_the_shortest_way(few, handmade):
     timed = {"seconds_per_metre": 4.0, "seconds_per_station": 1.5}
     rig = head_rig(stations={"carrier": "robot"} | timed)
@@ -188,6 +190,7 @@ def test_too_few_heads_measure_what_they_can_and_say_how_many_would(few):
     assert count.lower_bound > 1
 
 
+@pytest.mark.long
 def test_heads_that_never_have_room_beside_each_other_end_and_claim_nothing(few):
     """No two housings keep three metres apart: one stands, and no number is known."""
     place = {"standoff_mm": 600.0, "clearance_mm": 3000.0}
@@ -201,6 +204,7 @@ def test_heads_that_never_have_room_beside_each_other_end_and_claim_nothing(few)
     assert "housings keep off each other" in fewest_words(short)
 
 
+@pytest.mark.long
 def test_the_plan_is_the_same_with_two_threads(plan):
     again = planned(head_rig(head={"body": _BODY}), max_heads=9, threads=2)
     assert len(again.projectors) == len(plan.projectors)

@@ -58,6 +58,7 @@ def _refuse(patch, names):
         patch.setattr(f"planning.steps.{name}", asked)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("room", ["", ROOM])
 def test_the_command_finds_what_an_earlier_run_left_and_plans_the_same(
     small_job, tmp_path, monkeypatch, block, room
@@ -118,6 +119,7 @@ def test_a_prepared_planner_answers_as_plan_rig_does(rig):
     _same(plan.to_document(), bare.to_document())
 
 
+@pytest.mark.long
 def test_another_rig_finds_nothing_of_the_first(rig):
     cache = Cache.in_memory()
     asked = {"max_projectors": 3, "target": "surface", "dominant_coverage": 0.6}

@@ -285,6 +285,7 @@ def test_bodies_and_standing_devices_are_refused(ball, tmp_path):
             plan_rig(ball, load_rig(str(path)), **ASKED)
 
 
+@pytest.mark.long
 def test_obstacles_stand_in_the_way_and_the_audit_confirms_the_plan(
     ball, tmp_path, monkeypatch
 ):

@@ -46,6 +46,7 @@ def rig_file(folder, name, text):
 # ---- a closed form
 
 
+@pytest.mark.long
 def test_over_a_plate_a_disc_is_lit_and_a_lens_of_two_discs_measured(folder):
     """Incidence alone limits: up to 8 degrees, from 1 m over the plate.
 

@@ -25,6 +25,8 @@ from planning.scene.draws import Draw
 from planning.scene.measuring.measured import lit_samples, measured_by
 from planning.verify.audit.audit import audit_plan
 
+pytestmark = pytest.mark.long
+
 RIG = """
 base = "default"
 name = "flips"

@@ -8,6 +8,8 @@ from support.little_work import bound_roughly, draw_fewer, offer_fewer, search_b
 from geometry.shapes.sample_head.sample_head import sample_head
 from planning import load_mesh, load_rig, plan_rig
 
+pytestmark = pytest.mark.long
+
 # Up z becomes up -y, with a turn about it: not a symmetry of any world lattice.
 TURN = (
     Rotation.from_rotvec([np.pi / 2, 0, 0]) * Rotation.from_rotvec([0, 0, 0.7])

@@ -146,6 +146,7 @@ def planned(with_little_work):
         yield plan, *two_stages[0]
 
 
+@pytest.mark.long
 def test_it_is_no_dearer_and_no_narrower_than_the_two_stages(planned):
     plan, first, _ = planned
     record = plan.document.joint
@@ -159,6 +160,7 @@ def test_it_is_no_dearer_and_no_narrower_than_the_two_stages(planned):
     assert not shortfalls(plan)
 
 
+@pytest.mark.long
 def test_the_audit_finds_it_true_and_the_summary_tells_of_it(planned):
     plan, *_ = planned
     audit = audit_plan(plan, n_samples=4000, threads=1)
@@ -169,6 +171,7 @@ def test_the_audit_finds_it_true_and_the_summary_tells_of_it(planned):
     assert f"{plan.document.joint.over.projectors} projectors and" in text
 
 
+@pytest.mark.long
 def test_what_is_proposed_doesnt_depend_on_threads(planned):
     _, _, partial = planned
     found = []
@@ -189,6 +192,7 @@ def test_what_is_proposed_doesnt_depend_on_threads(planned):
         assert np.array_equal(a, b)
 
 
+@pytest.mark.long
 def test_numbers_other_than_the_fewest_are_told_as_such(planned):
     _, _, partial = planned
     own, one = partial.projectors, partial.stage.candidates.projectors[0]
@@ -205,6 +209,7 @@ def test_numbers_other_than_the_fewest_are_told_as_such(planned):
     assert projector_stage(partial, own[:-1]) is None
 
 
+@pytest.mark.long
 def test_cameras_are_proved_again_for_their_projectors(planned):
     _, _, partial = planned
     cameras = (*partial.cameras, partial.camera_stage.cover.candidates.cameras[0])

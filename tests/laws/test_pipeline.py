@@ -33,7 +33,10 @@ def head():
     return sample_head(n_faces=8000)
 
 
-@pytest.fixture(scope="module", params=["diverging", "parallel"])
+@pytest.fixture(
+    scope="module",
+    params=["diverging", pytest.param("parallel", marks=pytest.mark.long)],
+)
 def plan(request, head, tmp_path_factory, with_little_work):
     """In diverging light it is the plan that the README's library code makes.
 

@@ -55,6 +55,7 @@ def ball():
     return lattice_of(*scene_of(sphere(0.1, subdivisions=4), 0.865, 45.0), 40)
 
 
+@pytest.mark.long
 def test_six_caps_are_found_where_the_lattice_needs_seven(ball):
     source, offer = ball
     assert select_fewest(offer.cover).needed == 7

@@ -39,6 +39,7 @@ def taken(count: int):
     return scene, stage, [projector.model for projector in stage.projectors]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("count", [1, 2])
 def test_no_more_are_taken_than_there_are_however_they_are_moved(count):
     scene, stage, models = taken(count)

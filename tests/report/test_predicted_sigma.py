@@ -85,6 +85,7 @@ def test_the_claim_is_what_the_audit_finds(plan):
     assert audit_plan(plan, n_samples=4000).failures == ()
 
 
+@pytest.mark.long
 def test_a_check_in_the_light_that_the_rig_states_is_held_to_that(plan):
     """Not to `check.ambient`, which is of rigs whose light nobody knows."""
     record = verify_plan(plan, threads=1).reconstruction.record()

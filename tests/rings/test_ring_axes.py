@@ -45,6 +45,7 @@ def stages(scene):
     return made, projectors, cameras
 
 
+@pytest.mark.long
 def test_a_ball_needs_as_many_projectors_as_its_caps_do(stages):
     """Caps of 60 degrees (parallel) hold a quarter of the area: 0.6 takes 3 or more."""
     _, projectors, cameras = stages

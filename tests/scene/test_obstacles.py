@@ -284,6 +284,7 @@ SIGN = (
 )
 
 
+@pytest.mark.long
 def test_housings_and_obstacles_are_told_apart(rig_of, with_little_work):
     """What the bench keeps all reference projectors from no housing is blamed for.
 

@@ -65,6 +65,7 @@ def careless(few):
         yield _level(_ARM, _PIN, still=["pin"])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("degrees", [0.0, 7.5])
 def test_an_arm_between_two_places_of_the_lattice_leaves_no_room(few, degrees):
     """Housings stand 15 degrees apart; a thin arm passes all of their circle."""

@@ -111,6 +111,7 @@ def test_what_stands_still_is_seen_turned_back_at_each_step(among):
         assert np.exp(1j * turn) == pytest.approx(np.exp(-1j * one.angle), abs=1e-6)
 
 
+@pytest.mark.long
 def test_the_audit_and_pixels_bear_out_a_plan_among_posts_and_housings(among):
     found = verify_plan(among, threads=1)
     assert found.passed, found.summary()

@@ -100,6 +100,7 @@ def _made_here(handmade, figures, **elsewhere):
     return handmade.tampered(handmade.build_plan(), change)
 
 
+@pytest.mark.long
 def test_made_with_the_same_every_figure_is_compared_to_the_last_digit(
     handmade, verified
 ):

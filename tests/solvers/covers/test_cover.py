@@ -83,6 +83,7 @@ def visibility(n_e, n_s, *, seed=0, incidence=60.0):
     return lit & (points @ directions.T > -0.3), rng.uniform(0.5, 1.5, n_e)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("first", range(0, 120, 60))
 def test_equals_brute_force_whatever_the_budget(first):
     for seed in range(first, first + 60):

@@ -62,6 +62,7 @@ def multipliers_of(cover, seed):
     ][seed % 3]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("k", [1, 2, 3, 4, 5])
 def test_tuples_equal_brute_force(k):
     for seed in range(40):
@@ -80,6 +81,7 @@ def test_tuples_equal_brute_force(k):
         assert best <= search.upper_bound <= best * (1 + 1e-10)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("k", [2, 3, 4])
 def test_tuples_decide_to_the_last_unit_of_weight(k):
     """The most weight is reached, one unit more isn't: also when all rows count."""

@@ -40,6 +40,7 @@ def gap_of(plan):
     return min(np.linalg.norm(two - point, axis=1).min() for point in one)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("more", "kept"), [(-1e-3, True), (1e-3, False)])
 def test_housings_that_stand_nearer_than_the_clearance_are_named(
     plan, handmade, more, kept

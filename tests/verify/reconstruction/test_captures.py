@@ -208,6 +208,7 @@ def test_a_bit_or_root_disc_exchanged_with_its_inverse(job, p):
         assert_left_out(found, f"P{p + 1} with C1", "left out")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("p", [0, 1])
 def test_two_bits_or_a_bit_and_the_root_disc_exchanged(lit_job, p):
     root = lit_job.n_bits(p)
@@ -822,6 +823,7 @@ def clean_images(job: Job, bits: int, blur_m: float) -> InMemory:
     return InMemory(Path("x"), scanner, stacks)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("bits", "blur_m"),
     [(bits, blur) for bits in (LOW_NOISE, 8, 12) for blur in (0.0, 1e-3)]

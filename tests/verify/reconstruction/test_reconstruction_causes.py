@@ -88,6 +88,7 @@ def test_two_projectors_on_at_once_are_named(plan, claims):
     assert reconstruct(together, seed=0, expected=expected).failures == ()
 
 
+@pytest.mark.long
 def test_pixels_that_saturate_hide_no_fault_and_are_told_where_there_is_none(
     plan, claims, monkeypatch
 ):

@@ -207,6 +207,7 @@ def test_a_rig_that_is_not_the_plan_fails(rigs, one_light, samples, fault):
     assert re.search(cause, text), text
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("scale", [1.01, 0.99])
 def test_an_object_one_per_cent_off_in_size_fails(
     rigs, one_light, samples, ball, scale

@@ -158,6 +158,7 @@ def _lit(device: PinholeModel | ParallelModel, name: str, poses: Array) -> Mask:
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", _SHAPES)
 def test_no_place_lights_what_its_cell_lacks(name) -> None:
     _, _, samples, space = _shape(name)
@@ -234,6 +235,7 @@ _LIMITS_OF_PAIRS: dict[str, dict[str, object]] = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("light", ["diverging", "parallel"])
 @pytest.mark.parametrize("limit", _LIMITS_OF_PAIRS)
 def test_no_camera_measures_what_its_cell_lacks(handmade, light, limit) -> None:

@@ -168,6 +168,7 @@ def test_forged_ones_are_never_called_proved(case, kind) -> None:
     assert bounds[kind].trusted
 
 
+@pytest.mark.long
 def test_multipliers_of_others_prove_nothing(case) -> None:
     rng = np.random.default_rng(3)
     for made in (np.zeros(_N, np.int64), 1 << rng.integers(0, 40, _N)):
@@ -177,6 +178,7 @@ def test_multipliers_of_others_prove_nothing(case) -> None:
         assert "over all poses is claimed" in bounds["projector"].line
 
 
+@pytest.mark.long
 def test_less_area_than_can_be_derived_stays_claimed(case) -> None:
     whole = case.estimator.target_m2
     needed = case.plan.document.certificates.projectors.needed.count
@@ -203,6 +205,7 @@ _EDITS: dict[str, dict[str, object]] = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("words", _EDITS)
 def test_another_set_of_samples_is_refused(case, words) -> None:
     bounds, false = held(case, with_proof(case.plan, "projector", **_EDITS[words]))
