@@ -47,7 +47,6 @@ class JointSolution:
         cameras: Chosen cameras likewise.
         lower_bound: No answer costs less; inf if there is none.
         proof: What proves the bound, and what cut the proof short if anything did.
-        n_cuts: Sets of projectors that were shown to need dearer cameras.
     """
 
     problem: JointProblem
@@ -56,7 +55,6 @@ class JointSolution:
     cameras: _Index
     lower_bound: float
     proof: str
-    n_cuts: int = 0
 
     @property
     def cost(self) -> float:

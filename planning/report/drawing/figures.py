@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.devices import ParallelModel, PinholeModel
-from geometry.mesh.mesh import TriangleMesh
 from geometry.poses import transform
 from geometry.shapes.boxes import OrientedBox
 from planning.model.devices.bodies import Box
@@ -191,22 +190,11 @@ def best_direction(
 def close_directions(
     positions: NDArray[np.float64], centre: NDArray[np.float64], up: NDArray[np.float64]
 ) -> list[NDArray[np.float64]]:
-    """Return two views from the side that devices stand on, to its left and right."""
-    return _left_and_right(positions - centre, up)
+    """Return two views from the side that devices stand on, to its left and right.
 
-
-def region_directions(
-    mesh: TriangleMesh, chosen: NDArray[np.bool_], up: NDArray[np.float64]
-) -> list[NDArray[np.float64]]:
-    """Return two views from the side that chosen faces look to, left and right."""
-    area = mesh.face_areas[chosen, None]
-    return _left_and_right(area * mesh.face_normals[chosen], up)
-
-
-def _left_and_right(
-    away: NDArray[np.float64], up: NDArray[np.float64]
-) -> list[NDArray[np.float64]]:
-    """Two views, a little from above, from the side of the sum of vectors (n, 3)."""
+    A little from above.
+    """
+    away = positions - centre
     side = away.sum(axis=0)
     side -= (side @ up) * up
     # Devices all round, or all overhead, stand on no side.
