@@ -76,8 +76,7 @@ def _better(
     count = stage.certificate.needed.count
     if better is not stage or bound.proof().lower_bound >= count:
         return better
-    allowed = source.scene.requirements.max_projectors
-    if allowed is not None and count - 1 > allowed:
+    if count - 1 > source.scene.requirements.max_projectors:
         # One fewer is still more than there may be.
         return stage
     offer = ProjectorOffer(source, stage.candidates)

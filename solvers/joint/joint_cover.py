@@ -256,17 +256,13 @@ class _Search:
             none = np.isinf(bound)
             status = SolveStatus.INFEASIBLE if none else SolveStatus.UNKNOWN
             proof = "all devices together aren't enough" if none else self._proof()
-            return JointSolution(
-                self.problem, status, _NONE, _NONE, bound, proof, len(self.cuts)
-            )
+            return JointSolution(self.problem, status, _NONE, _NONE, bound, proof)
         bound = min(bound, self.cost)
         proved = not self._saves(bound)
         status = SolveStatus.OPTIMAL if proved else SolveStatus.FEASIBLE
         bound = self.cost if proved else bound
         proof = self._proof() if proved else f"{self._proof()}, cut by the work budget"
-        return JointSolution(
-            self.problem, status, *self.best, bound, proof, len(self.cuts)
-        )
+        return JointSolution(self.problem, status, *self.best, bound, proof)
 
     def _proof(self) -> str:
         if not self.cuts:
