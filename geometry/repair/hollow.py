@@ -106,7 +106,9 @@ def _kind(share: float, wall_m: float | None, thin_m: float) -> str:
 
 def _sight(caster: RayCaster, spots: Spots) -> tuple[Array, Array, Mask]:
     """Of each spot: free share of the hemisphere, wall below [m], whether inside."""
-    openness = look_out(caster, spots, _RAYS) / _RAYS
+    # What sees a third of the outside doesn't lie inside, however much more it sees.
+    third = int(np.ceil(LESS_THAN_BEHIND * _RAYS))
+    openness = look_out(caster, spots, _RAYS, enough=third) / _RAYS
     wall = np.full(len(spots), np.inf)
     start = spots.points - _OFFSET * caster.extent * spots.normals
     behind, distance = caster.first_hits(start, -spots.normals)

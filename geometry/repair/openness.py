@@ -44,7 +44,7 @@ class Spots:
     def __len__(self) -> int:
         return len(self.faces)
 
-    def take(self, chosen: slice) -> "Spots":
+    def take(self, chosen: slice | Ints) -> "Spots":
         """Return some of the spots."""
         return Spots(
             self.faces[chosen],
@@ -116,16 +116,36 @@ def _ordered_corners(mesh: TriangleMesh, faces: Ints) -> tuple[Array, Array, Arr
 
 
 def look_out(
-    caster: RayCaster, spots: Spots, n_rays: int, *, behind: bool = False
+    caster: RayCaster,
+    spots: Spots,
+    n_rays: int,
+    *,
+    behind: bool = False,
+    enough: int | None = None,
 ) -> Ints:
     """Return how many rays over each spot's cosine-weighted hemisphere escape, (n,).
 
-    `behind`: from the back of the faces, inwards, instead of the front.
+    `behind`: from the back of the faces, inwards, instead of the front. Where `enough`
+    have escaped of the first half, the others aren't cast: so many at least would.
     """
+    half = n_rays if enough is None else n_rays // 2
+    rays = np.arange(n_rays)
+    escaped = _escaped(caster, spots, rays[:half], n_rays, behind=behind)
+    if enough is not None:
+        few = np.flatnonzero(escaped < enough)
+        others = spots.take(few)
+        escaped[few] += _escaped(caster, others, rays[half:], n_rays, behind=behind)
+    return escaped
+
+
+def _escaped(
+    caster: RayCaster, spots: Spots, rays: Ints, n_rays: int, *, behind: bool
+) -> Ints:
+    """Return how many of some of the rays over each spot escape, (n,)."""
     side = -1.0 if behind else 1.0
-    k = (np.arange(n_rays) + 0.5) / n_rays
+    k = (rays + 0.5) / n_rays
     radius, height = np.sqrt(k), np.sqrt(1.0 - k)
-    around = np.arange(n_rays) * _GOLDEN
+    around = rays * _GOLDEN
     escaped = np.empty(len(spots), dtype=np.int64)
     offset = side * _OFFSET * caster.extent
     for part in equal_parts(len(spots), max(_MAX_RAYS // n_rays, 1)):
@@ -136,6 +156,7 @@ def look_out(
             + (radius * np.sin(angle))[..., None] * e2[:, None]
             + (side * height)[:, None] * normal[:, None]
         ).reshape(-1, 3)
-        start = np.repeat(spots.points[part] + offset * normal, n_rays, axis=0)
-        escaped[part] = (~caster.met(start, along)).reshape(-1, n_rays).sum(axis=1)
+        start = np.repeat(spots.points[part] + offset * normal, len(rays), axis=0)
+        met = caster.met(start, along).reshape(-1, len(rays))
+        escaped[part] = (~met).sum(axis=1)
     return escaped
