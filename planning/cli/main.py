@@ -3,6 +3,7 @@
 Heavy packages are imported inside the commands, so that `plan --help` stays quick.
 """
 
+import gc
 import os
 import sys
 import time
@@ -31,6 +32,9 @@ from planning.cli.declared.rigs_declared import lens, play, rigs, schema
 from planning.cli.declared.tolerance_declared import tolerance
 
 from .console import stop, stop_signals
+
+# That have to come before garbage is looked for.
+_OBJECTS = 20_000
 
 
 class _DefaultGroup(click.Group):
@@ -144,6 +148,8 @@ def main() -> None:
     # and IPOPT are loaded. Rays have threads of their own.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ[name] = "1"
+    # Most of what is made while modules are imported stays.
+    gc.set_threshold(_OBJECTS, 50, 50)
     try:
         with stop_signals(_quit):
             sys.exit(commands.main(prog_name="plan", standalone_mode=False, obj=begin))
