@@ -62,7 +62,11 @@ def camera_stage(
 def bound_stage(
     scene: Scene, stage: CameraStage, devices: Sequence[PinholeModel], effort: Effort
 ) -> CameraStage:
-    """Return the stage with the bound over all poses in its certificate."""
+    """Return the stage with the bound over all poses in its certificate.
+
+    It has none where existing cameras measure all that is reached of the first samples,
+    and aren't enough for all.
+    """
     proof, cover = stage.certificate, stage.cover
     samples, measured = cover.samples, cover.measured
     n_samples = len(samples.target)
@@ -70,9 +74,11 @@ def bound_stage(
     reached = np.any(measured[:n], axis=1)
     free = np.any(measured[:n, : proof.given], axis=1)
     wanted = np.flatnonzero(reached & ~free)
-    if proof.needed.count <= proof.given or not wanted.size:
+    if proof.needed.count <= proof.given:
         n_reached = int(np.any(measured, axis=1).sum())
         return replace(stage, certificate=with_existing_alone(proof, n_reached))
+    if not wanted.size:
+        return stage
     question = BoundQuestion.about(
         proof,
         reached,

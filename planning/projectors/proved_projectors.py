@@ -43,25 +43,24 @@ def prove_fewest(
     the cover is solved again; unless none are to be `joining` those that there are.
     """
     source = CandidateSource(scene, templates)
-    while stage.certificate.needed.count > stage.certificate.given:
-        bound = bound_of(scene, stage, templates, effort)
-        if bound is None:
-            break
+    while (bound := bound_of(scene, stage, templates, effort)) is not None:
         better = _better(source, stage, bound, effort) if joining else stage
         if better is stage:
-            return with_bound(stage, bound)
+            break
         stage = better
-    return with_bound(stage, None)
+    return with_bound(stage, bound)
 
 
 def with_bound(stage: ProjectorStage, bound: ContinuousBound | None) -> ProjectorStage:
     """Return the stage with a bound in its certificate, of `bound_of`."""
     before = stage.certificate
-    if bound is None:
-        n_reached = int(stage.candidates.reached.sum())
-        return replace(stage, certificate=with_existing_alone(before, n_reached))
-    certificate = joined(before, bound.proof())
-    return replace(stage, certificate=certificate, refutation=bound.refutation())
+    if bound is not None:
+        certificate = joined(before, bound.proof())
+        return replace(stage, certificate=certificate, refutation=bound.refutation())
+    if before.needed.count > before.given:
+        return stage
+    n_reached = int(stage.candidates.reached.sum())
+    return replace(stage, certificate=with_existing_alone(before, n_reached))
 
 
 def _better(
@@ -73,14 +72,13 @@ def _better(
     """Return the stage with fewer projectors, if poses are found between the bounds."""
     offered = source.towards(bound.directions)
     better = _with_more(stage, offered) if offered else stage
-    count = stage.certificate.needed.count
-    if better is not stage or bound.proof().lower_bound >= count:
+    # Numbers between the most that there may be and the count are of use to nobody.
+    allowed = source.scene.requirements.max_projectors
+    fewer = min(stage.certificate.needed.count - 1, allowed)
+    if better is not stage or bound.proof().lower_bound > fewer:
         return better
-    if count - 1 > source.scene.requirements.max_projectors:
-        # One fewer is still more than there may be.
-        return stage
     offer = ProjectorOffer(source, stage.candidates)
-    found = free_devices(offer, count - 1, effort.starts)
+    found = free_devices(offer, fewer, effort.starts)
     return _with_more(stage, found) if found else stage
 
 
@@ -110,8 +108,11 @@ def bound_of(
 ) -> ContinuousBound | None:
     """Bound the projectors of a stage over every pose of the workspace.
 
-    None where existing ones may light all that is reached of the first samples.
+    None where existing ones are enough, or may light all that is reached of the first
+    samples: then nothing is known over all poses.
     """
+    if stage.certificate.needed.count <= stage.certificate.given:
+        return None
     # The first samples are a draw of their own; the others came where it overfitted.
     samples = stage.candidates.samples
     n = min(len(samples), effort.most_samples or len(samples))

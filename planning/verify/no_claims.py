@@ -40,14 +40,20 @@ NO_CLAIM = {
 
 def is_under(key: str, patterns: Iterable[str]) -> bool:
     """Return whether a key is one of the patterns, or below one."""
-    return _any_of(tuple(patterns)).match(key) is not None
+    return _under(tuple(patterns)).match(key) is not None
+
+
+def _any_of(patterns: Iterable[str]) -> str:
+    return "|".join(re.escape(one).replace(r"\*", ".*") for one in patterns)
 
 
 @cache
-def _any_of(patterns: tuple[str, ...]) -> re.Pattern[str]:
+def _under(patterns: tuple[str, ...]) -> re.Pattern[str]:
     """Compiled, as keys by the thousand are asked about."""
-    either = "|".join(re.escape(one).replace(r"\*", ".*") for one in patterns)
-    return re.compile(rf"(?:{either})(?:\.|\Z)", re.DOTALL)
+    return re.compile(rf"(?:{_any_of(patterns)})(?:\.|\Z)", re.DOTALL)
+
+
+_NO_CLAIM = re.compile(_any_of(NO_CLAIM), re.DOTALL)
 
 
 def claims_alone(value: Any, key: str = "") -> Any:  # noqa: ANN401
@@ -57,7 +63,7 @@ def claims_alone(value: Any, key: str = "") -> Any:  # noqa: ANN401
         return {
             name: claims_alone(part, named[name])
             for name, part in value.items()
-            if not is_under(named[name], NO_CLAIM)
+            if not _NO_CLAIM.fullmatch(named[name])
         }
     if isinstance(value, list):
         return [claims_alone(part, f"{key}.{i}") for i, part in enumerate(value)]

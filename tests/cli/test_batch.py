@@ -210,22 +210,35 @@ def test_a_process_that_is_killed_is_begun_again_and_then_told(monkeypatch, tmp_
     assert count.read_text() == "xx"
 
 
-# A part that begins and stays, in a process that plans nothing else.
+# Two parts that begin and stay, in a batch that plans nothing.
 STAYS = """
+import sys
 from planning.cli.batch import part_task
+from planning.cli.main import main
 before, _ = part_task._PLAN.split("from planning.cli.main")
 part_task._PLAN = before + "open('begun', 'w'); import time; time.sleep(300)"
-part_task.plan_part(part_task.PartTask("a.stl", {"a.stl": b""}, {}, (), 1))
+main()
 """
 
 
-def test_a_batch_that_is_killed_leaves_no_part_and_no_folder_behind(tmp_path):
-    found = {"TMPDIR": str(tmp_path), "PYTHONPATH": found_path()}
-    batch = subprocess.Popen([sys.executable, "-c", STAYS], env=os.environ | found)
-    assert soon(lambda: list(tmp_path.glob("ringrig-*/part/begun")))
-    batch.kill()
-    batch.wait()
-    assert soon(lambda: not list(tmp_path.iterdir()))
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+def test_a_batch_that_is_ended_leaves_no_part_and_no_folder_behind(tmp_path, how):
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "now").mkdir()
+    for name in ("a.stl", "b.stl"):
+        (tmp_path / "parts" / name).write_bytes(b"")
+    words = ["batch", "parts", "-o", "out", "--max-projectors", "3", "--jobs", "2"]
+    batch = subprocess.Popen(
+        [sys.executable, "-c", STAYS, *words],
+        env=os.environ | {"TMPDIR": "now", "PYTHONPATH": found_path()},
+        cwd=tmp_path,
+        stderr=subprocess.DEVNULL,
+    )
+    begun = "now/ringrig-*/part/begun"
+    assert soon(lambda: len(list(tmp_path.glob(begun))) == 2)
+    batch.send_signal(how)
+    batch.wait(timeout=60)
+    assert soon(lambda: not list((tmp_path / "now").iterdir()))
 
 
 def soon(holds):

@@ -100,6 +100,19 @@ def test_what_fresh_samples_deny_is_asked_for_again_and_given_up(ball, monkeypat
     assert len({draw for _, draw in asked}) == len(asked)
 
 
+@pytest.mark.long
+def test_as_few_as_there_may_be_are_found_where_candidates_need_two_more():
+    """Ten poses light 0.87 of a ball by eight caps; six need 0.146 each."""
+    scene, template = scene_of(sphere(0.1, subdivisions=4), 0.87, 45.0)
+    asked = replace(scene.requirements, max_projectors=6)
+    source, offer = lattice_of(replace(scene, requirements=asked), template, 10)
+    stage = ProjectorStage.over(offer, select_fewest(offer.cover))
+    assert stage.certificate.needed.count == 8
+    effort = replace(EFFORT, budget=2e8)
+    proof = prove_fewest(offer.scene, stage, source.templates, effort).certificate
+    assert (proof.count, proof.needed.count, proof.status) == (6, 6, "optimal")
+
+
 def upright(axis):
     """A plate that stands up and faces along an axis of the ground."""
     plate = grid(0.1, 0.1, divisions=(6, 6))
@@ -132,7 +145,7 @@ def test_two_projectors_light_a_cross_for_which_candidates_need_three(monkeypatc
         found.append((needed.count, bound.lower_bound))
     assert found == [(3, 2), (2, 2)]
 
-    # Nobody looks for two where there may be one.
+    # Nobody looks for two where there may be one, and two are proved to be needed.
     one = replace(offer.scene.requirements, max_projectors=1)
     scene = replace(offer.scene, requirements=one)
     stage = replace(stage, candidates=replace(offer, scene=scene))

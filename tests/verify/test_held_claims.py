@@ -17,7 +17,7 @@ from planning.model.errors import PlanFileError
 from planning.model.plan import RigPlan
 from planning.report.made_again import again_or_why_not
 from planning.verify.held_figures import EXACTLY
-from planning.verify.no_claims import is_under
+from planning.verify.no_claims import claims_alone, is_under
 from planning.verify.trust import OVER_POSES, is_trusted
 from planning.verify.verification import verify_plan
 
@@ -402,3 +402,5 @@ def test_keys_are_under_a_pattern_as_a_whole():
     assert not is_under("rig.camera.sourcesx", ["rig.*.sources"])
     assert is_trusted("certificates.cameras.by_count.0.upper_bound_m2")
     assert not is_trusted("certificates.cameras.count")
+    named = {"rig": {"name": "mine", "name.limit": 3}, "created": "now"}
+    assert claims_alone(named) == {"rig": {"name.limit": 3}}

@@ -229,6 +229,16 @@ def test_a_missed_limit_is_a_failure_unless_reported(strict, change, sentence):
     assert any(sentence in failure for failure in found.failures)
 
 
+def test_what_pixels_measure_is_judged_where_a_plan_says_that_nothing_is(
+    handmade, strict
+):
+    silent = handmade.tampered(
+        strict(None), lambda d: d["coverage"]["surface"].update(measured_m2=0.0)
+    )
+    failures = verify_plan(silent).failures
+    assert any(line.startswith("95th percentile") for line in failures)
+
+
 def test_a_missed_limit_of_what_really_stands_there_is_a_failure(
     handmade, strict, honest
 ):

@@ -5,12 +5,14 @@ this one's folders. A process that is killed takes nothing with it, and is begun
 """
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
@@ -70,16 +72,23 @@ class PartEnd:
     files: Mapping[str, bytes]
 
 
-# Processes of parts that run in this one, and whether no more are begun.
+# Processes of parts that run in this one, their folders, and whether no more are begun.
 _running: set[subprocess.Popen[str]] = set()
+_folders: set[Path] = set()
 _stopped = threading.Event()
 
 
 def stop_parts() -> None:
-    """End the parts that run in this process; none is begun after it."""
+    """End the parts that run in this process; none is begun after it.
+
+    Their folders go, too: nobody waits for the threads that would remove them.
+    """
     _stopped.set()
     for process in tuple(_running):
         process.kill()
+        process.wait()
+    for folder in tuple(_folders):
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def plan_part(task: PartTask) -> PartEnd:
@@ -87,9 +96,9 @@ def plan_part(task: PartTask) -> PartEnd:
     begin = time.monotonic()
     files: dict[str, bytes] = {}
     try:
-        with TemporaryDirectory(prefix="ringrig-") as place:
-            code, message = _planned(task, Path(place))
-            out = Path(place) / _OUT
+        with TemporaryDirectory(prefix="ringrig-") as name, _kept(name) as place:
+            code, message = _planned(task, place)
+            out = place / _OUT
             files = {
                 path.relative_to(out).as_posix(): path.read_bytes()
                 for path in sorted(out.rglob("*"))
@@ -98,6 +107,17 @@ def plan_part(task: PartTask) -> PartEnd:
     except (PlanningError, OSError) as error:
         code, message = NO_FILE, one_line(str(error))
     return PartEnd(task.name, code, message, time.monotonic() - begin, files)
+
+
+@contextmanager
+def _kept(name: str) -> Generator[Path]:
+    """Give the folder of a part, until which ends `stop_parts` knows of it."""
+    folder = Path(name).resolve()
+    _folders.add(folder)
+    try:
+        yield folder
+    finally:
+        _folders.discard(folder)
 
 
 def _planned(task: PartTask, place: Path) -> tuple[int, str]:
