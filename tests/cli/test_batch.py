@@ -6,6 +6,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 from dataclasses import replace
 
@@ -239,6 +240,14 @@ def test_a_batch_that_is_ended_leaves_no_part_and_no_folder_behind(tmp_path, how
     batch.send_signal(how)
     batch.wait(timeout=60)
     assert soon(lambda: not list((tmp_path / "now").iterdir()))
+
+
+def test_folders_go_where_nobody_waits_for_their_threads(tmp_path, monkeypatch):
+    monkeypatch.setattr(part_task, "_stopped", threading.Event())
+    (tmp_path / "part").mkdir()
+    with part_task._kept(str(tmp_path / "part")):
+        part_task.stop_parts()
+    assert not (tmp_path / "part").exists()
 
 
 def soon(holds):
