@@ -4,7 +4,7 @@ Keys are dotted, `*` stands for any name or number; a key stands for all below i
 """
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from typing import Any
 
@@ -40,17 +40,20 @@ NO_CLAIM = {
 
 def is_under(key: str, patterns: Iterable[str]) -> bool:
     """Return whether a key is one of the patterns, or below one."""
-    return _under(tuple(patterns)).match(key) is not None
+    return under(tuple(patterns))(key) is not None
+
+
+@cache
+def under(patterns: tuple[str, ...]) -> Callable[[str], object]:
+    """Return what is None of a key that is under none of the patterns.
+
+    Compiled, as keys by the thousand are asked about.
+    """
+    return re.compile(rf"(?:{_any_of(patterns)})(?:\.|\Z)", re.DOTALL).match
 
 
 def _any_of(patterns: Iterable[str]) -> str:
     return "|".join(re.escape(one).replace(r"\*", ".*") for one in patterns)
-
-
-@cache
-def _under(patterns: tuple[str, ...]) -> re.Pattern[str]:
-    """Compiled, as keys by the thousand are asked about."""
-    return re.compile(rf"(?:{_any_of(patterns)})(?:\.|\Z)", re.DOTALL)
 
 
 _NO_CLAIM = re.compile(_any_of(NO_CLAIM), re.DOTALL)

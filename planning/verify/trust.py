@@ -11,7 +11,7 @@ from planning.model.plan import RigPlan
 from planning.verify.audit.proofs.poses.pose_claims import PoseBound
 
 from .held_figures import EXACTLY, WHOLLY
-from .no_claims import is_under
+from .no_claims import is_under, under
 
 OVER_POSES = "bounds over all poses: not derived again, which --proofs does"
 
@@ -234,7 +234,7 @@ def _named(
     """Return of each kind of claims in a table those that a plan makes."""
     keys = list(_keys(plan.to_document()))
     return {
-        what: [p for p in patterns if any(is_under(key, (p,)) for key in keys)]
+        what: [p for p in patterns if any(map(under((p,)), keys))]
         for what, patterns in table.items()
     }
 

@@ -242,12 +242,11 @@ def test_a_batch_that_is_ended_leaves_no_part_and_no_folder_behind(tmp_path, how
     assert soon(lambda: not list((tmp_path / "now").iterdir()))
 
 
-def test_folders_go_where_nobody_waits_for_their_threads(tmp_path, monkeypatch):
+def test_folders_go_where_nobody_waits_for_their_threads(monkeypatch):
     monkeypatch.setattr(part_task, "_stopped", threading.Event())
-    (tmp_path / "part").mkdir()
-    with part_task._kept(str(tmp_path / "part")):
+    with part_task._folder() as folder:
         part_task.stop_parts()
-    assert not (tmp_path / "part").exists()
+        assert not folder.exists()
 
 
 def soon(holds):

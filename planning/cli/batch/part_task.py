@@ -96,7 +96,7 @@ def plan_part(task: PartTask) -> PartEnd:
     begin = time.monotonic()
     files: dict[str, bytes] = {}
     try:
-        with TemporaryDirectory(prefix="ringrig-") as name, _kept(name) as place:
+        with _folder() as place:
             code, message = _planned(task, place)
             out = place / _OUT
             files = {
@@ -110,14 +110,16 @@ def plan_part(task: PartTask) -> PartEnd:
 
 
 @contextmanager
-def _kept(name: str) -> Generator[Path]:
-    """Give the folder of a part, until which ends `stop_parts` knows of it."""
-    folder = Path(name).resolve()
-    _folders.add(folder)
-    try:
-        yield folder
-    finally:
-        _folders.discard(folder)
+def _folder() -> Generator[Path]:
+    """Give a folder for one part, which is removed behind it."""
+    with TemporaryDirectory(prefix="ringrig-") as name:
+        # A part runs elsewhere than this process.
+        folder = Path(name).resolve()
+        _folders.add(folder)
+        try:
+            yield folder
+        finally:
+            _folders.discard(folder)
 
 
 def _planned(task: PartTask, place: Path) -> tuple[int, str]:
