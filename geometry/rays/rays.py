@@ -8,6 +8,8 @@ and the checkers each bring a policy of their own.
 from collections.abc import Callable, Iterable
 from functools import cached_property
 from itertools import pairwise
+from threading import Lock
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from embreex.mesh_construction import TriangleMesh as _EmbreeMesh
@@ -20,6 +22,10 @@ from geometry.parallel import mapped, n_threads
 
 # Rays in one call of embree: their arrays stay in the second-level cache.
 CHUNK = 1 << 14
+# Embree's trees by their meshes, whose arrays never change: a tree takes longer to make
+# than most of its casters trace.
+_TREES: WeakKeyDictionary[TriangleMesh, EmbreeScene] = WeakKeyDictionary()
+_MAKING = Lock()
 
 
 class RayCaster:
@@ -29,7 +35,8 @@ class RayCaster:
     of the mesh, in float64, and scaled by a power of two (so exactly) to a mesh of
     about unit size before they are rounded: a mesh far from the origin, or a tiny one,
     is hit as precisely as any. Rays are traced in chunks, so memory stays bounded, and
-    each ray's answer is independent of the number of threads.
+    each ray's answer is independent of the number of threads. Casters of one mesh share
+    its tree, which is made once.
 
     Attributes:
         middle: Of the bounding box in [m]; the origin of the caster's own frame. (Not
@@ -50,13 +57,18 @@ class RayCaster:
         half = 0.5 * float(np.linalg.norm(high - low))
         self.scale = float(np.exp2(-np.floor(np.log2(half)))) if half > 0 else 1.0
         self.reach = half * self.scale
-        self._scene = EmbreeScene(robust=True)
-        # Vertices that no face uses may lie anywhere, also beyond float32.
-        used, faces = numbered(mesh.faces, len(mesh.vertices))
-        vertices = self.local(mesh.vertices[used])
-        _EmbreeMesh(self._scene, vertices, np.ascontiguousarray(faces, dtype=np.int32))
-        # The first call commits the scene; do it here, where no thread races.
-        self._scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
+        with _MAKING:
+            if mesh not in _TREES:
+                tree = EmbreeScene(robust=True)
+                # Vertices that no face uses may lie anywhere, also beyond float32.
+                used, faces = numbered(mesh.faces, len(mesh.vertices))
+                vertices = self.local(mesh.vertices[used])
+                corners = np.ascontiguousarray(faces, dtype=np.int32)
+                _EmbreeMesh(tree, vertices, corners)
+                # The first call commits the tree; do it here, where no thread races.
+                tree.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
+                _TREES[mesh] = tree
+            self._scene = _TREES[mesh]
 
     @cached_property
     def extent(self) -> float:

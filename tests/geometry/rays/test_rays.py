@@ -1,5 +1,10 @@
+import gc
+import weakref
+from unittest.mock import Mock
+
 import numpy as np
 import pytest
+from embreex.rtcore_scene import EmbreeScene
 from support.plain_shapes import box, grid
 
 from geometry.mesh.mesh import TriangleMesh
@@ -123,3 +128,20 @@ def test_what_embree_would_swallow_is_refused(
 def test_a_caster_needs_a_thread() -> None:
     with pytest.raises(ValueError, match="threads must be at least 1, got 0"):
         RayCaster(sphere(0.1, subdivisions=1), threads=0)
+
+
+def test_casters_of_a_mesh_share_a_tree_and_keep_no_mesh_alive(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    made = Mock(wraps=EmbreeScene)
+    monkeypatch.setattr("geometry.rays.rays.EmbreeScene", made)
+    meshes = [sphere(radius, subdivisions=2) for radius in (0.1, 0.1, 0.2)]
+    casters = [RayCaster(mesh, threads=n) for n in (1, 2) for mesh in meshes]
+    assert made.call_count == len(meshes)
+    along = directions(50)
+    hits = [one.first_hits(np.zeros(3), along)[1].mean() for one in casters]
+    np.testing.assert_allclose(hits, 2 * [0.1, 0.1, 0.2], rtol=0.05)
+    kept = weakref.ref(meshes[0])
+    del meshes, casters
+    gc.collect()
+    assert kept() is None
