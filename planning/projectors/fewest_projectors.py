@@ -131,8 +131,9 @@ class Search:
             if again.needed >= selection.needed:
                 break
             selection = again
-        if selection.lower_bound < selection.needed:
-            # Only a count that is kept is worth a longer proof.
+        taken = selection.needed <= candidates.cover.most
+        if taken and selection.lower_bound < selection.needed:
+            # Only a count that is kept, and may be taken, is worth a longer proof.
             floored = selection.floors is not None
             selection = select_fewest(
                 candidates.cover,

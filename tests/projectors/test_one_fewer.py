@@ -13,7 +13,7 @@ from support.factories import make_projector, make_requirements, make_scene
 
 from geometry.shapes.primitives import sphere
 from planning.projectors.candidate_set import CandidateSet, CandidateSource
-from planning.projectors.fewest_projectors import confirms
+from planning.projectors.fewest_projectors import Found, Search, confirms
 from planning.projectors.one_fewer import _swapped, one_fewer
 from planning.projectors.share_margin import margin_at_share, widest_between
 from planning.proofs.quotas import Quotas, RegionFloors, missed_shares
@@ -60,6 +60,31 @@ def test_fresh_samples_deny_as_if_all_candidates_were_asked(lattice, monkeypatch
         answers.append(lit.sum() >= share * fresh.reached.sum())
         assert confirms(asking, offer.of(few), 1) == answers[-1]
     assert 3 < sum(answers) < 37
+
+
+@pytest.mark.parametrize(("allowed", "longer"), [(9, 1), (3, 0)])
+def test_a_longer_proof_is_of_a_count_that_may_be_taken(
+    ball, monkeypatch, allowed, longer
+):
+    """Six caps; each bound is said to be open after the first work."""
+    (scene, template), asked = ball, []
+
+    def open_after(cover, *, budget=None, **how):
+        asked.append(budget)
+        return replace(select_fewest(cover, **how), lower_bound=1)
+
+    monkeypatch.setattr(
+        "planning.projectors.fewest_projectors.select_fewest", open_after
+    )
+    scene = scene.asking(replace(scene.requirements, max_projectors=allowed))
+    source = CandidateSource(scene, (template,))
+    candidates = CandidateSet.over(
+        scene, scene.target_samples(Draw(500, 100)), source.lattice(40)
+    )
+    none = Found(candidates, select_fewest(candidates.cover), 0, confirmed=False)
+    found = Search(source, 40, 80, rounds=1).fewest(none)
+    assert len(found.selection.chosen) == min(found.selection.needed, allowed)
+    assert sum(budget is not None for budget in asked) == longer
 
 
 def moved(lattice, n_projectors, n_existing=0):
