@@ -33,6 +33,7 @@ from .claims.marginal import OfNumber, marginal_records
 from .entries import device_entries as entries
 from .entries.overlaps import overlap_records
 from .entries.survival_entries import survival_record
+from .offered_again import offered_again
 from .written_plan import written_devices, written_scene
 
 
@@ -109,6 +110,7 @@ def made_again(plan: RigPlan, *, threads: int) -> dict[str, Any]:
         "dominant_share": regions.dominant_share,
         "sha256": _surface_digest(plan, regions),
     }
+    parts["rig"] = offered_again(plan, scene, devices)
     mesh = entries.mesh_record(scene.mesh, scene.shell).to_document()
     parts["meshes"] = [{name: mesh[name] for name in ("area_m2", "shell")}]
     return {key: _plain(part) for key, part in parts.items()}

@@ -37,8 +37,8 @@ def written_devices(plan: RigPlan) -> Devices:
     surface, workspace = plan.surface, plan.requirements.workspace
     rig = plan.document.rig
     widest = np.round([workspace.reference_ring_radius], DECIMALS)
-    lit = _templates(plan.projectors, rig.models("projector"))
-    views = _templates(plan.cameras, rig.models("camera"))
+    lit = templates_of(plan.projectors, rig.models("projector"))
+    views = templates_of(plan.cameras, rig.models("camera"))
     poses = zip(
         surface.reference_projectors,
         surface.reference_rings,
@@ -62,8 +62,8 @@ def written_devices(plan: RigPlan) -> Devices:
     )
 
 
-def _templates(devices: Sequence[_D], models: Sequence[ModelRecord]) -> list[_D]:
-    """A device of each model that stands nowhere; the plan may hold none of it."""
+def templates_of(devices: Sequence[_D], models: Sequence[ModelRecord]) -> list[_D]:
+    """Return a device of each model that stands nowhere; the plan may hold none."""
     like = replace(devices[0], existing="")
     if len(models) == 1:
         return [like]

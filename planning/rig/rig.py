@@ -251,8 +251,8 @@ class Rig(RigDevices):
             "camera": self._document_of(self.camera_models[0]),
             "standoff_m": self.standoff_m,
             "standoff_play_m": self.standoff_play_m,
-            "n_candidate_projectors": table.placement.n_candidate_projectors,
-            "n_candidate_cameras": table.placement.n_candidate_cameras,
+            "n_candidate_projectors": self.n_projector_poses,
+            "n_candidate_cameras": self.n_camera_poses,
             "rings": {
                 "tilt": None,
                 "shift_m": None,

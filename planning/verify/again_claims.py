@@ -9,7 +9,7 @@ from planning.verify.audit.audit_findings import AuditFindings
 # but for advice, which takes the search to give, for what the audit compares, and for
 # parts of parts.
 _ELSEWHERE = {"relaxations", "camera_relaxations", "asked"}
-_PARTLY = {"meshes", "requirements", "ring_axes", "surface", "survival"}
+_PARTLY = {"meshes", "requirements", "rig", "ring_axes", "surface", "survival"}
 # So many figures that differ are told.
 _MOST_TOLD = 8
 

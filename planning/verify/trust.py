@@ -203,6 +203,16 @@ def of_surface(plan: RigPlan, claims_held: str) -> tuple[str, ...]:
             chosen = "by a file that surface.selection names"
         what = what or "which faces are of which region"
         lines.append(f"{what} (region in surface.npz): chosen {chosen}")
+    again = kinds_offered_again(plan) if claims_held == EXACTLY else ()
+    beside = [kind for kind in ("projector", "camera") if kind not in again]
+    if plan.cameras_alone:
+        beside = ["camera"]
+    if beside:
+        places = ", ".join(f"reference_{kind}s" for kind in beside)
+        lines.append(
+            f"which poses define what can be reached, of which shares are ({places} "
+            f"in surface.npz)"
+        )
     limited = requirements.projector.min_tangent_angle > 0.0 and not plan.cameras_alone
     if claims_held != EXACTLY and limited:
         lines.append(
@@ -210,6 +220,19 @@ def of_surface(plan: RigPlan, claims_held: str) -> tuple[str, ...]:
             "angles are limited: a face without one has no such limit"
         )
     return tuple(lines)
+
+
+def kinds_offered_again(plan: RigPlan) -> tuple[str, ...]:
+    """Return of which kinds of devices the poses that the rig offers come out again.
+
+    Poses of another plan may stand for those of devices that stand already, and bodies
+    of cameras had to be clear of projectors that have moved since.
+    """
+    rig, requirements = plan.document.rig, plan.requirements
+    if plan.document.request is None or requirements.existing or plan.cameras_alone:
+        return ()
+    bodied = any(model.body is not None for model in rig.models("camera"))
+    return ("projector",) if bodied else ("projector", "camera")
 
 
 def _of_check(plan: RigPlan, figures_held: str) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from planning.cameras import camera_baselines
 from planning.cameras.paper import hole_closing
 from planning.projectors import share_margin
 from planning.proofs import camera_bound, marginals, projector_bound
+from planning.report import offered_again
 from planning.rig.rig import Rig
 from planning.scene.draws import DRAWS
 from planning.verify.audit.audit_case import examine
@@ -100,6 +101,8 @@ def offer_fewer(patch):
     """Let fewer poses be offered than a rig file can ask for, until it is undone."""
     for name, count in _POSES.items():
         patch.setattr(Rig, name, count)
+    least = {name.split("_")[1]: count for name, count in _POSES.items()}
+    patch.setattr(offered_again, "_LEAST", least)
 
 
 def bound_roughly(patch):

@@ -16,9 +16,10 @@ from planning.model.document.request_records import asked_digest
 from planning.model.errors import PlanFileError
 from planning.model.plan import RigPlan
 from planning.report.made_again import again_or_why_not
+from planning.verify.again_claims import compare_again
 from planning.verify.held_figures import EXACTLY
 from planning.verify.no_claims import claims_alone, is_under
-from planning.verify.trust import OVER_POSES, is_trusted
+from planning.verify.trust import OVER_POSES, is_trusted, of_surface
 from planning.verify.verification import verify_plan
 
 
@@ -102,6 +103,38 @@ def test_a_billionth_shows_where_the_audit_alone_cannot_tell(plan, place, key):
     (failure,) = found(edited).failures
     assert failure.split(":")[0].endswith(key)
     assert "the same computation again gives" in failure
+
+
+@pytest.mark.parametrize("kind", ["projector", "camera"])
+def test_a_pose_that_the_rig_offers_and_nobody_may_take_shows(plan, kind):
+    """What it alone reaches needn't be lit, and all figures come out as written."""
+    name = f"reference_{kind}s"
+    poses = getattr(plan.surface, name).copy()
+    poses[1] = poses[0]
+    surface = replace(plan.surface, **{name: poses})
+    document = plan.to_document()
+    document["surface"]["sha256"] = surface.sha256()
+    again = again_or_why_not(RigPlan.from_document(document, surface), 1)
+    assert (
+        again["rig"][f"n_candidate_{kind}s"] < document["rig"][f"n_candidate_{kind}s"]
+    )
+    false = compare_again(document, {"rig": again["rig"]})
+    assert len(false) == 1
+    assert false[0].startswith(f"rig.n_candidate_{kind}s: claimed")
+
+
+def test_poses_that_may_be_of_another_plan_are_taken_on_trust(plan):
+    told = "define what can be reached"
+    assert not any(told in line for line in of_surface(plan, EXACTLY))
+    assert any(told in line for line in of_surface(plan, ""))
+    without = plan.to_document()
+    without["rig"]["camera"]["body"] = {
+        "half_m": [0.1, 0.1, 0.1],
+        "centre_m": [0.0, 0.0, 0.0],
+    }
+    bodied = RigPlan.from_document(without, plan.surface)
+    (line,) = (each for each in of_surface(bodied, EXACTLY) if told in each)
+    assert "(reference_cameras in" in line
 
 
 def test_fewer_cameras_are_proved_too_few_with_rings_as_written(short):

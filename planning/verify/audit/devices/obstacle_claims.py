@@ -14,6 +14,7 @@ from planning.model.plan import RigPlan
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 
+from .solid_claims import lacks_of_solid
 from .workspace_claims import room_from_world
 from .zone_claims import origin_of, turned
 
@@ -122,6 +123,11 @@ def _audit_shape(
         off <= _ROUNDING, key, f"differs from the rig's by {1e3 * off:.3g} mm"
     )
     findings.number(f"{key} (area)", obstacle.mesh.area, area, _FACETED * area)
+    shape = local.reshape(-1, 3, 3)
+    lacks = lacks_of_solid(
+        shape, obstacle.mesh.faces, sides, round=table.shape == "cylinder"
+    )
+    findings.holds(not lacks, key, lacks)
 
 
 def _sides_and_area(table: ObstacleRecord) -> tuple[Array, float]:
