@@ -5,19 +5,25 @@ import numpy as np
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import sample_surface
 from geometry.rays.proximity import closest_points
+from planning.model.plan import RigPlan
+
+from .audit.audit_findings import AuditFindings
 
 _MM = 1e3
 _MESH_SAMPLES = 2000
 # A mesh that is larger or smaller by more than this is another file or unit.
 _MOST_RESIZED = 1.5
+# Of two normals that look the other way, minus their product; and how much may: of
+# sheets without thickness either side is as near.
+_OPPOSITE, _MOST_TURNED = 0.5, 0.005
 
 
-def compare_meshes(mesh: TriangleMesh, surface: TriangleMesh) -> list[str]:
+def compare_meshes(mesh: TriangleMesh, surface: TriangleMesh, seed: int) -> list[str]:
     """Return why a mesh isn't the surface of a plan; nothing if it is.
 
-    Random points of either must lie on the other within 1e-4 of its radius, and the
-    areas agree to 1e-3: the same shape, though it be differently repaired or
-    triangulated.
+    Random points of either must lie on the other within 1e-4 of its radius, on faces
+    that look the same way, and the areas agree to 1e-3: the same shape, though it be
+    differently repaired or triangulated.
     """
     slack = 1e-4 * surface.radius
     if not np.allclose(mesh.bounds, surface.bounds, rtol=0.0, atol=slack):
@@ -26,11 +32,17 @@ def compare_meshes(mesh: TriangleMesh, surface: TriangleMesh) -> list[str]:
             f"mesh: its bounding box ({sizes[0].tolist()} mm) isn't that of "
             f"surface.npz ({sizes[1].tolist()} mm); check file, unit and axes"
         ]
-    apart = max(_apart(mesh, surface), _apart(surface, mesh))
+    ways = [_beside(mesh, surface, seed), _beside(surface, mesh, seed)]
+    apart, turned = (max(figures) for figures in zip(*ways, strict=True))
     if not apart <= slack:
         return [
             f"mesh: lies up to {_MM * apart:.3g} mm off surface.npz "
             f"(tolerance {_MM * slack:.2g} mm): another shape"
+        ]
+    if not turned <= _MOST_TURNED:
+        return [
+            f"mesh: {100.0 * turned:.1f} % of it looks the other way in surface.npz "
+            f"(tolerance {100.0 * _MOST_TURNED:g} %), and light and view go by that"
         ]
     if not abs(mesh.area - surface.area) <= 1e-3 * surface.area:
         return [
@@ -40,6 +52,23 @@ def compare_meshes(mesh: TriangleMesh, surface: TriangleMesh) -> list[str]:
     return []
 
 
+def compare_records(mesh: TriangleMesh, plan: RigPlan) -> list[str]:
+    """Return what a plan says falsely of the file that it was made from, if this is it.
+
+    A scale that follows from a size is that of a surface which is rounded.
+    """
+    record, source = plan.document.meshes[0], mesh.source
+    if source is None or source.sha256 != record.sha256:
+        return []
+    findings = AuditFindings()
+    for name in ("unit", "n_vertices", "n_faces", "repairs"):
+        of_file = getattr(source, name)
+        findings.same(f"meshes.0.{name}", getattr(record, name), of_file, "of the file")
+    scale = source.scale_to_m
+    findings.number("meshes.0.scale_to_m", record.scale_to_m, scale, 1e-6 * scale)
+    return list(findings.failures)
+
+
 def comparable(mesh: TriangleMesh, surface: TriangleMesh) -> bool:
     """Whether a mesh may be the plan's object, changed: near it and of its size."""
     low, high = 1.0 / _MOST_RESIZED, _MOST_RESIZED
@@ -47,7 +76,13 @@ def comparable(mesh: TriangleMesh, surface: TriangleMesh) -> bool:
     return low <= mesh.radius / surface.radius <= high and apart <= surface.radius
 
 
-def _apart(mesh: TriangleMesh, other: TriangleMesh) -> float:
-    """Largest distance of random points of one mesh from the other in [m]."""
-    points = sample_surface(mesh, _MESH_SAMPLES, seed=0).points
-    return float(np.abs(closest_points(other, points).distances).max())
+def _beside(mesh: TriangleMesh, other: TriangleMesh, seed: int) -> tuple[float, float]:
+    """How random points of one mesh lie on the other.
+
+    Their largest distance [m], and the share on faces that look the other way.
+    """
+    samples = sample_surface(mesh, _MESH_SAMPLES, seed=seed)
+    nearest = closest_points(other, samples.points)
+    normals = other.face_normals[nearest.faces]
+    along = np.einsum("ij,ij->i", samples.normals, normals)
+    return float(np.abs(nearest.distances).max()), float((along < -_OPPOSITE).mean())

@@ -6,6 +6,8 @@ Keys are dotted, `*` stands for any name or number; a key stands for all below i
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from geometry.mesh.mesh import TriangleMesh
 from planning.model.plan import RigPlan
 from planning.verify.audit.proofs.poses.pose_claims import PoseBound
@@ -172,6 +174,12 @@ def taken_on_trust(
             "the mesh file that was planned (meshes): the one given has the same shape "
             "and other bytes"
         )
+    if mesh is not None:
+        x, y, z = 1e3 * np.ptp(mesh.bounds, axis=0)
+        lines.append(
+            f"the unit of the mesh file, {record.unit} by the plan, in which it is "
+            f"{x:.4g} x {y:.4g} x {z:.4g} mm"
+        )
     return tuple(lines)
 
 
@@ -203,6 +211,12 @@ def of_surface(plan: RigPlan, claims_held: str) -> tuple[str, ...]:
             chosen = "by a file that surface.selection names"
         what = what or "which faces are of which region"
         lines.append(f"{what} (region in surface.npz): chosen {chosen}")
+    lines += [
+        f"the shape of obstacle {one.name!r} (obstacle_* in surface.npz): the rig has "
+        f"it from a file"
+        for one in plan.document.rig.obstacle
+        if one.shape == "mesh"
+    ]
     again = kinds_offered_again(plan) if claims_held == EXACTLY else ()
     beside = [kind for kind in ("projector", "camera") if kind not in again]
     if plan.cameras_alone:

@@ -18,7 +18,11 @@ from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.coverage.prediction import possible_at_floors
 from planning.verify.audit.figure_claims import contradictions
 from planning.verify.family import audit_family
-from planning.verify.mesh_comparison import comparable, compare_meshes
+from planning.verify.mesh_comparison import (
+    comparable,
+    compare_meshes,
+    compare_records,
+)
 from planning.verify.reconstruction.check.accuracy import Expected
 from planning.verify.reconstruction.check.comparison import PredictedSamples, compare
 from planning.verify.reconstruction.check.interreflection import (
@@ -115,9 +119,10 @@ def verify_plan(
     case = examine(plan, seed=seed, threads=threads)
     other, differs = None, list[str]()
     if mesh is not None:
-        differs = compare_meshes(mesh, plan.surface.mesh)
+        differs = compare_meshes(mesh, plan.surface.mesh, seed)
         if differs and comparable(mesh, plan.surface.mesh):
             other = mesh
+        differs += compare_records(mesh, plan)
     recorded = plan.document.reconstruction
     if recorded is not None:
         room = assumed_light(Scanner.of(plan)).ambient

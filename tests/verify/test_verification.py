@@ -2,10 +2,13 @@
 
 import json
 import re
+from dataclasses import asdict
 
 import numpy as np
 import pytest
+import trimesh
 
+from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import sphere
 from planning.model.document.check_records import ReconstructionRecord
@@ -14,7 +17,8 @@ from planning.model.errors import PlanFileError
 from planning.model.plan import RigPlan
 from planning.verify import verification
 from planning.verify.audit import figure_claims
-from planning.verify.verification import compare_meshes, verify_plan
+from planning.verify.mesh_comparison import compare_meshes, compare_records
+from planning.verify.verification import verify_plan
 
 
 def compare_figures(recorded, again):
@@ -405,14 +409,47 @@ def test_one_shape_in_other_triangles_is_the_same_mesh():
     finer = TriangleMesh(
         corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
     )
-    assert compare_meshes(mesh, mesh) == []
-    assert compare_meshes(finer, mesh) == []
+    assert compare_meshes(mesh, mesh, 0) == []
+    assert compare_meshes(finer, mesh, 0) == []
 
 
 def test_another_shape_in_the_same_box_is_named():
     mesh = sphere(0.05, subdivisions=3)
     dented = mesh.vertices.copy()
     dented[(np.abs(dented) > 0.02).all(axis=1)] *= 0.97
-    assert "another shape" in compare_meshes(TriangleMesh(dented, mesh.faces), mesh)[0]
+    other = TriangleMesh(dented, mesh.faces)
+    assert "another shape" in compare_meshes(other, mesh, 0)[0]
     doubled = TriangleMesh(mesh.vertices, np.vstack([mesh.faces, mesh.faces]))
-    assert "area" in compare_meshes(doubled, mesh)[0]
+    assert "area" in compare_meshes(doubled, mesh, 0)[0]
+
+
+def test_faces_that_look_the_other_way_are_named():
+    """Of half a ball and of a twentieth: N is what light and view are limited by."""
+    mesh = sphere(0.05, subdivisions=3)
+    for part in (2, 20):
+        turned = mesh.faces.copy()
+        some = slice(len(turned) // part)
+        turned[some] = turned[some, ::-1]
+        (why,) = compare_meshes(mesh, TriangleMesh(mesh.vertices, turned), 0)
+        assert "looks the other way" in why
+
+
+def test_what_is_said_of_the_file_is_held_against_the_file(tmp_path, handmade):
+    path = tmp_path / "ball.ply"
+    ball = sphere(50.0, subdivisions=2)
+    trimesh.Trimesh(ball.vertices, ball.faces).export(path)
+    mesh = load_mesh(path, size_mm=90.0)
+
+    def saying(**figures):
+        def change(document):
+            document["meshes"][0] |= asdict(mesh.source) | figures
+
+        return compare_records(mesh, handmade.tampered(handmade.build_plan(), change))
+
+    assert saying() == saying(n_faces=7, sha256="0" * 64) == []
+    for name, value in (
+        *(("n_vertices", 7), ("n_faces", 7), ("unit", "mm"), ("scale_to_m", 1e-3)),
+        ("repairs", [{"kind": "holes_closed", "count": 12}]),
+    ):
+        (false,) = saying(**{name: value})
+        assert false.startswith(f"meshes.0.{name}: ")

@@ -21,6 +21,11 @@ _CALIBRATION = (
     ("focal", "focal_percent", 1e-2),
     ("principal_px", "principal_px", 1.0),
 )
+_MOUNTING = (
+    ("position_m", "position_mm", 1e-3),
+    ("angle", "angle_deg", math.pi / 180.0),
+    ("focal", "focal_percent", 1e-2),
+)
 
 # What a rig states in full wherever a plan says what was asked of it.
 _STATED = {
@@ -209,6 +214,12 @@ def _of_rig(plan: RigPlan) -> Iterator[_Pair]:
         key = "requirements.triangulation.ring_sigma_m"
         value = used.triangulation.ring_sigma_m
         yield key, value, "rig.limits.ring_sigma_mm [m]", stated
+    if used.robust is not None:
+        for name, key, unit in _MOUNTING:
+            value = getattr(used.robust.mounting, name)
+            stated, whose = rig.mounting.get(key, 0.0), f"rig.mounting.{key}"
+            where = f"requirements.robust.mounting.{name}"
+            yield where, value, whose, unit * stated
     for name, key, unit in _CALIBRATION:
         if key in rig.calibration:
             stated = rig.calibration[key]
