@@ -11,7 +11,6 @@ from functools import cached_property
 from io import BytesIO
 from pathlib import Path
 from typing import Any, ClassVar
-from zipfile import ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,11 +20,9 @@ from geometry.files.file_content import file_content
 
 from .errors import PlanFileError
 from .files import reading
-from .surface import DAMAGED
+from .packed_arrays import unpacked_arrays
 
 KINDS = ("projector", "camera")
-# What all arrays may take, unpacked [bytes].
-_LARGEST = 1_000_000_000
 _Fields = dict[str, tuple[str, int]]
 _OF_COVERS: _Fields = {
     "draws": ("i", 2),
@@ -226,17 +223,7 @@ class ProofFile:
 
     @cached_property
     def _arrays(self) -> dict[str, NDArray[Any]]:
-        try:
-            with ZipFile(BytesIO(self.content)) as archive:
-                size = sum(entry.file_size for entry in archive.infolist())
-            if size > _LARGEST:
-                raise PlanFileError(f"it holds {size} bytes, at most {_LARGEST}")
-            with np.load(BytesIO(self.content), allow_pickle=False) as archive:
-                return {name: archive[name] for name in archive.files}
-        except PlanFileError:
-            raise
-        except (OSError, ValueError, *DAMAGED) as error:
-            raise PlanFileError(f"not a readable .npz ({error})") from None
+        return unpacked_arrays(self.content)
 
 
 def _unpacked(

@@ -1,15 +1,12 @@
 """The surface as planned: what every claim in a plan speaks about."""
 
 import hashlib
-import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
-from tokenize import TokenError
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +19,7 @@ from geometry.mesh.topology import numbered
 from .devices.bodies import Obstacle
 from .errors import PlanFileError
 from .files import reading
+from .packed_arrays import unpacked_arrays
 
 # Kinds of numbers and the shape of each array; any number n.
 _ARRAYS: dict[str, tuple[str, tuple[int | str, ...]]] = {
@@ -53,18 +51,6 @@ _MODELS: dict[str, tuple[str, tuple[int | str, ...]]] = {
 # Squares and cubes of what is larger by far overflow.
 _LARGEST = 1e9
 _BESIDE_MESH = list(_ARRAYS)[2:]
-# What numpy and zipfile raise on damaged archives, beside OSError and ValueError.
-DAMAGED = (
-    BadZipFile,
-    EOFError,
-    MemoryError,
-    NotImplementedError,
-    RuntimeError,
-    SyntaxError,
-    TypeError,
-    TokenError,
-    zlib.error,
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,18 +161,13 @@ class Surface:
                 f"the two files must come from one run"
             )
         try:
-            with np.load(BytesIO(content), allow_pickle=False) as archive:
-                wanted = _ARRAYS | (
-                    _OBSTACLES if set(_OBSTACLES) & set(archive) else {}
-                )
-                sometimes = _MODELS | _STATIONS
-                wanted |= {n: of for n, of in sometimes.items() if n in archive}
-                arrays = {name: archive[name] for name in wanted}
-        except KeyError as error:
-            raise PlanFileError(f"{path}: {error.args[0]}; plan again") from None
-        except (OSError, ValueError, *DAMAGED) as error:
-            raise PlanFileError(f"{path}: not a readable .npz ({error})") from None
-        try:
+            packed = unpacked_arrays(content)
+            wanted = _ARRAYS | (_OBSTACLES if set(_OBSTACLES) & set(packed) else {})
+            sometimes = _MODELS | _STATIONS
+            wanted |= {n: of for n, of in sometimes.items() if n in packed}
+            if lacking := wanted.keys() - packed.keys():
+                raise PlanFileError(f"{min(lacking)} is missing; plan again")
+            arrays: dict[str, Any] = {name: packed[name] for name in wanted}
             solids = (*_OBSTACLES, *_STATIONS)
             apart = ("vertices", "faces", *solids)
             _check_arrays({name: arrays[name] for name in apart if name in arrays}, {})

@@ -111,7 +111,8 @@ class Verification:
             if self.passed
             else f"NOT verified: {count_words(len(self.failures), 'failure')}"
         )
-        return "\n".join(lines)
+        # Names are the file's words, and end no line.
+        return "\n".join(" ".join(line.split()) for line in lines)
 
 
 def _areas_line(name: str, areas: Mapping[str, float], *, alone: bool) -> str:

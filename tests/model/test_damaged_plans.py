@@ -4,10 +4,13 @@
 """
 
 from collections import Counter
+from io import BytesIO
 
+import numpy as np
 import pytest
 from support.damaged_plans import outcome
 
+from planning.model import packed_arrays
 from planning.model.errors import PlanFileError
 
 
@@ -25,3 +28,15 @@ def test_a_seed_that_no_stream_has_is_refused(handmade):
 
     with pytest.raises(PlanFileError, match="seed = -1"):
         handmade.tampered(handmade.build_plan(), below_zero)
+
+
+def test_what_unpacks_to_far_more_than_it_takes_is_refused(monkeypatch):
+    monkeypatch.setattr(packed_arrays, "_LEAST", 10_000)
+    buffer = BytesIO()
+    np.savez_compressed(buffer, some=np.zeros(1_000_000))
+    with pytest.raises(PlanFileError, match=r"unpacks to 80\d{5} bytes, at most"):
+        packed_arrays.unpacked_arrays(buffer.getvalue())
+    plain = BytesIO()
+    np.savez_compressed(plain, some=np.arange(10_000.0))
+    (some,) = packed_arrays.unpacked_arrays(plain.getvalue()).values()
+    np.testing.assert_array_equal(some, np.arange(10_000.0))

@@ -63,7 +63,8 @@ def edited(plan, place, value):
         ("surface.curvature_radius_m", -0.01, "greater than or equal to 0"),
         ("version", True, "version True, this program reads 1"),
         ("version", 1.0, "version 1.0, this program reads 1"),
-        ("surface.path", "a\0b", "no file's name holds a NUL"),
+        ("surface.path", "a\0b", "must hold no control character"),
+        ("surface.path", "a\nplan: fine", "must hold no control character"),
     ],
 )
 def test_what_none_can_compute_with_is_refused_in_a_line(

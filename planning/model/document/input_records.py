@@ -10,7 +10,7 @@ from geometry.devices import ParallelModel, PinholeModel
 from planning.model.devices.bodies import Body
 
 from .head_records import CarrierRecord, HeadRecord, TurntableRecord
-from .part import Count, Interval, Matrix3, Part, Resolution, Size, Vector3
+from .part import Count, FileName, Interval, Matrix3, Part, Resolution, Size, Vector3
 
 
 class Units(Part):
@@ -70,7 +70,7 @@ class SelectionRecord(Part):
 class SurfaceRecord(Part):
     """The file of the surface as planned."""
 
-    path: str
+    path: FileName
     sha256: str
     curvature_radius_m: Size
     dominant_share: Size

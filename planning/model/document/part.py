@@ -22,6 +22,16 @@ Row4 = tuple[float, float, float, float]
 _Rows3 = tuple[Vector3, Vector3, Vector3]
 
 
+def _is_printable(text: str) -> str:
+    if not text.isprintable():
+        raise ValueError("must hold no control character")
+    return text
+
+
+# Of a file beside the plan; what errors say of it stays one line.
+FileName = Annotated[str, AfterValidator(_is_printable)]
+
+
 class Part(BaseModel):
     """A part of a plan file; keys that aren't known are kept and not looked at."""
 

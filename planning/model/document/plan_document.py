@@ -34,7 +34,7 @@ from .input_records import (
 )
 from .joint_records import JointRecord
 from .made_with import MadeWith
-from .part import Part
+from .part import FileName, Part
 from .request_records import RequestRecord
 from .ring_records import RingAxes
 from .station_records import StationsRecord
@@ -87,7 +87,7 @@ class MemberRecord(Part):
     regions: tuple[int, ...]
     reconstruction: ReconstructionRecord | None = None
     name: str = ""
-    path: str = ""
+    path: FileName = ""
     digest: str = ""
     alignment: AlignmentRecord | None = None
 

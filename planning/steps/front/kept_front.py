@@ -16,7 +16,7 @@ from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.errors import InputError, PlanFileError
 from planning.model.files import reading
 from planning.model.front import Front, FrontPoint
-from planning.model.surface import DAMAGED
+from planning.model.packed_arrays import DAMAGED
 from planning.projectors.candidate_set import CandidateSet
 from planning.report.partial_plan import Prepared
 from planning.scene.draws import DRAWS
