@@ -272,6 +272,29 @@ def test_what_was_used_is_what_the_rig_states(plan, place, value, named):
 
 
 @pytest.mark.parametrize(
+    ("stated", "false"),
+    [
+        ({"position_mm": 5.0}, []),
+        ({}, ["position_m"]),
+        ({"position_mm": 9.0, "angle_deg": 1.0}, ["position_m", "angle"]),
+    ],
+)
+def test_drawn_rigs_are_mounted_as_loosely_as_the_rig_states(plan, stated, false):
+    asked = dict.fromkeys(("dominant_coverage", "coverage", "region_coverage"), 0.1)
+    mounting = {"position_m": 0.005, "angle": 0.0, "focal": 0.0}
+    asked |= {"quantile": 0.9, "mounting": mounting, "max_sigma_m": 1e-3}
+
+    def robust(document):
+        document["requirements"]["robust"] = asked
+        document["rig"]["mounting"] = stated
+
+    key = "requirements.robust.mounting."
+    failures = found(forged(plan, robust), again=None).failures
+    told = [line.split(":")[0] for line in failures if line.startswith(key)]
+    assert told == [key + name for name in false]
+
+
+@pytest.mark.parametrize(
     ("place", "value"),
     [
         ("rig.rings.tilt", "much"),
