@@ -64,7 +64,7 @@ class DivergingLight:
         """Return which samples show light their back, N.(P - Q) > 0 surely."""
         offsets = points - pose[:3, 3]
         behind = np.einsum("ij,ij->i", normals, offsets)
-        return behind > 1e-9 * np.abs(offsets).max(axis=0, initial=0.0).sum()
+        return behind > 3e-9 * np.abs(offsets).max(initial=0.0)
 
     def within_ring(self, local: _Array, ring: float) -> _Mask:
         """Return which columns of the ring frame, (3, n), lie in the cone R <= ring."""

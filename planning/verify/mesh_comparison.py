@@ -61,9 +61,14 @@ def compare_records(mesh: TriangleMesh, plan: RigPlan) -> list[str]:
     if source is None or source.sha256 != record.sha256:
         return []
     findings = AuditFindings()
-    for name in ("unit", "n_vertices", "n_faces", "repairs"):
+    for name in ("unit", "n_vertices", "n_faces"):
         of_file = getattr(source, name)
         findings.same(f"meshes.0.{name}", getattr(record, name), of_file, "of the file")
+    claimed, made = (
+        [f"{repair.count} {repair.kind}" for repair in told.repairs]
+        for told in (record, source)
+    )
+    findings.same("meshes.0.repairs", claimed, made, "of the file")
     scale = source.scale_to_m
     findings.number("meshes.0.scale_to_m", record.scale_to_m, scale, 1e-6 * scale)
     return list(findings.failures)

@@ -435,10 +435,11 @@ def test_faces_that_look_the_other_way_are_named():
 
 
 def test_what_is_said_of_the_file_is_held_against_the_file(tmp_path, handmade):
-    path = tmp_path / "ball.ply"
+    path = tmp_path / "ball.stl"
     ball = sphere(50.0, subdivisions=2)
     trimesh.Trimesh(ball.vertices, ball.faces).export(path)
     mesh = load_mesh(path, size_mm=90.0)
+    assert mesh.source.repairs
 
     def saying(**figures):
         def change(document):
