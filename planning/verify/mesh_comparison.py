@@ -70,7 +70,8 @@ def compare_records(mesh: TriangleMesh, plan: RigPlan) -> list[str]:
     )
     findings.same("meshes.0.repairs", claimed, made, "of the file")
     scale = source.scale_to_m
-    findings.number("meshes.0.scale_to_m", record.scale_to_m, scale, 1e-6 * scale)
+    key = "meshes.0.scale_to_m"
+    findings.number(key, record.scale_to_m, scale, 1e-6 * scale, "m")
     return list(findings.failures)
 
 
