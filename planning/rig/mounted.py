@@ -36,7 +36,7 @@ _ANGLES = ("pan_deg", "tilt_deg")
 _QUATERNION = ("qw", "qx", "qy", "qz")
 _WAYS = {_AIM: ("roll_deg",), _ANGLES: ("roll_deg",), _QUATERNION: ()}
 REQUIRED = ("name", "kind", *_POSITION)
-OPTIONAL = (*_AIM, *_ANGLES, "roll_deg", *_QUATERNION, "model")
+OPTIONAL = (*_AIM, *_ANGLES, "roll_deg", *_QUATERNION, "model", "frame")
 # How far a written quaternion may be from length 1.
 _UNIT = 1e-3
 
@@ -162,6 +162,12 @@ def _read_row(row: CsvRow) -> ExistingTable:
     """One device; exactly one way says where it looks."""
     if not row.has("name"):
         raise InputError(f"{row.where}: name is empty; every device has one")
+    if row.has("frame"):
+        raise InputError(
+            f"{row.where}: {row.cells['name']!r} is in another frame "
+            f"({row.cells['frame']}), must be in the axes of the mesh file; export "
+            f"without --frame"
+        )
     values: dict[str, Any] = {name: row.cells[name] for name in ("name", "kind")}
     if row.has("model"):
         values["model"] = row.cells["model"]

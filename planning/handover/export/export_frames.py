@@ -43,6 +43,11 @@ class ExportFrame:
     words: str
     frame_from_mesh: Array
 
+    @property
+    def is_meshs(self) -> bool:
+        """Whether coordinates in it are those of the mesh file."""
+        return np.array_equal(self.frame_from_mesh, np.eye(4))
+
 
 def frame_of(text: str | None, workspace: Workspace) -> ExportFrame:
     """Return the frame that a text names.

@@ -50,8 +50,9 @@ class MountTables:
         "corners of the object's bounding box on the floor (or its lowest face). "
         "Of several models a last column says which one. poses.csv: optical centres "
         "and quaternions (device to frame, OpenCV axes) with all digits, as `plan "
-        "evaluate --poses` reads it. optics.csv: pixels; "
-        "the centre of the top-left one is (0, 0). Lines that begin with # are "
+        "evaluate --poses` reads it; in another frame than the mesh's, which a column "
+        "`frame` names, it is refused there. optics.csv: pixels; the centre of the "
+        "top-left one is (0, 0). Lines that begin with # are "
         "comments."
     )
 
@@ -84,9 +85,14 @@ class MountTables:
                 rows = ([*row, of] for row, of in zip(rows, models, strict=True))
             return _table(told, head, rows)
 
+        names, poses = _POSES, map(_pose, devices)
+        if not rig.frame.is_meshs:
+            # Poses are read in the mesh's axes, and comments aren't read at all.
+            names = (*names, "frame")
+            poses = ([*pose, rig.frame.words] for pose in poses)
         return {
             "mounts.csv": table(notes, _MOUNTS, (_mount(d, rig) for d in devices)),
-            "poses.csv": table(frame, _POSES, map(_pose, devices)),
+            "poses.csv": table(frame, names, poses),
             "optics.csv": table([], _OPTICS, map(_optics, devices)),
         }
 

@@ -22,9 +22,11 @@ from geometry.poses import inverse, transform
 from planning.handover.export.export_formats import FORMATS
 from planning.handover.export.export_frames import frame_of
 from planning.handover.export.exported_rig import ExportedRig
+from planning.handover.export.mount_tables import MountTables
 from planning.handover.export.ros_files import roll_pitch_yaw
 from planning.handover.export.sheets.landmarks import Landmarks
 from planning.handover.export.write_exports import write_export
+from planning.model.errors import InputError
 from planning.rig.mounted import read_mounted
 from planning.rig.rig import load_rig
 
@@ -257,14 +259,28 @@ def test_usd_s_cameras_re_project_in_single_precision(rig, folder):
         holds(replace(device, planned=straight), pose, matrix)
 
 
-def test_tables_are_poses_for_plan_evaluate_and_distances_for_a_tape(rig, folder):
-    path = folder / "csv" / "poses.csv"
-    mounted = read_mounted(path, load_rig("default"))
-    for table, device in zip(mounted.tables, rig.devices, strict=True):
-        assert (table.name, table.kind) == (device.id, device.kind)
+@pytest.mark.parametrize("frame", [None, "0,0,0"])
+def test_poses_of_the_mesh_s_frame_are_read_back(rig, tmp_path, frame):
+    plan = rig.plan
+    same = ExportedRig.of(plan, frame_of(frame, plan.requirements.workspace))
+    write_export(same, MountTables(), tmp_path)
+    mounted = read_mounted(tmp_path / "poses.csv", load_rig("default"))
+    devices = (*plan.projectors, *plan.cameras)
+    for table, device in zip(mounted.tables, devices, strict=True):
+        assert table.name == device.id
         pose = np.array(table.pose_mm)
         pose[:3, 3] *= 1e-3
         np.testing.assert_allclose(pose, device.world_from_device, atol=1e-12)
+
+
+def test_poses_of_another_frame_are_refused_where_they_are_read(folder):
+    """A comment alone would let them be read as the mesh's, metres away."""
+    told = r"poses.csv: line 3: 'P1' is in another frame \(.* 100, -50, 30 mm.*\), must"
+    with pytest.raises(InputError, match=told):
+        read_mounted(folder / "csv" / "poses.csv", load_rig("default"))
+
+
+def test_tables_have_distances_for_a_tape(rig, folder):
     assert mounts(folder / "csv", rig)[0] <= 0.005 + 1e-9
     text = (folder / "csv" / "mounts.csv").read_text()
     assert "azimuth 40, tilt 20, roll -10" in text
