@@ -134,3 +134,11 @@ def test_mitsuba_alone_goes_where_it_went_and_says_what_it_lacks(
     heights = [device.centre[2] for device in (*scanner.projectors, *scanner.cameras)]
     assert max(heights) < 0.1
     assert scanner.projectors[0].world_from_ring[2, 3] == pytest.approx(heights[0])
+
+
+def test_mitsuba_s_scenes_tell_one_frame(plain, tmp_path):
+    done = export(plain, "--to", "mitsuba", "--frame", "0,0,1000", "-o", tmp_path)
+    assert done.exit_code == 0, done.output
+    readme = (tmp_path / "README.txt").read_text()
+    assert "Lengths are metres, in the frame named below." in readme
+    assert readme.endswith("Frame: axes of the mesh, origin at its 0, 0, 1000 mm\n")

@@ -32,7 +32,7 @@ patterns/            what is projected, -Dframe=; sequence.json says what each i
 
 Parameters (-Dname=value): {defaults}; max_depth counts
 light's path from projector to camera, 2 is without a bounce between surfaces.
-Lengths are metres, in the axes of the mesh. Images are linear: radiance, not levels.
+Lengths are metres, in the frame named below. Images are linear: radiance, not levels.
 Pixel (0, 0) of an image has its centre at (0.5, 0.5) in Mitsuba, at (0, 0) in the plan.
 A camera's image is the window of a larger film whose middle is the principal point.
 {lenses}
