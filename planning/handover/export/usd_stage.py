@@ -21,6 +21,9 @@ _TENTHS = 10.0
 # Width of the sensor that lenses are told for [m]: only ratios matter to a projection.
 _SENSOR_M = 0.036
 _LINE_M = 5e-4
+# What may be up in a stage, and what is said where neither is; turns round by so much.
+_UP_AXES = {"Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
+_ELSE_UP, _SAME_AXIS = "Z", 1e-9
 # Sizes of a lens that are tried for one that single precision keeps.
 _SIZES = 1 << 20
 
@@ -40,17 +43,24 @@ class UsdStage:
     )
 
     def lacks(self, rig: ExportedRig) -> list[str]:
-        """Return a sentence for distortion."""
-        if not rig.distorted:
-            return []
-        return [
-            f"{id_words(rig.distorted)}: distortion stands in ringrig:distortion "
-            f"alone, USD's cameras have none"
-        ]
+        """Return a sentence for distortion, and one for an up that isn't +y or +z."""
+        sentences: list[str] = []
+        if rig.distorted:
+            sentences.append(
+                f"{id_words(rig.distorted)}: distortion stands in ringrig:distortion "
+                f"alone, USD's cameras have none"
+            )
+        if _up_axis(rig) is None:
+            x, y, z = _up(rig) + 0.0
+            sentences.append(
+                f"up is ({x:.4g}, {y:.4g}, {z:.4g}) in this frame; USD's upAxis, which "
+                f"is +y or +z alone, says {_ELSE_UP}"
+            )
+        return sentences
 
     def files(self, rig: ExportedRig) -> dict[str, Content]:
         """Return `rig.usda`."""
-        axis = "Y" if int(np.argmax(np.abs(rig.up))) == 1 else "Z"
+        axis = _up_axis(rig) or _ELSE_UP
         obstacles = [
             _mesh(f"obstacle{index}", mesh, name)
             for index, (name, mesh) in enumerate(rig.obstacles.items())
@@ -69,6 +79,20 @@ class UsdStage:
 {_prim("Xform", "rig", parts)}
 '''
         return {"rig.usda": text.encode()}
+
+
+def _up(rig: ExportedRig) -> Array:
+    """Return where the plan's up points to in the frame, however that is turned."""
+    turn = rig.frame.frame_from_mesh[:3, :3]
+    return turn @ np.array(rig.plan.requirements.workspace.up)
+
+
+def _up_axis(rig: ExportedRig) -> str | None:
+    """Return what USD calls the plan's up; None: it has no word for it."""
+    for name, axis in _UP_AXES.items():
+        if np.abs(_up(rig) - axis).max() <= _SAME_AXIS:
+            return name
+    return None
 
 
 def _device(device: ExportedDevice) -> str:

@@ -25,6 +25,7 @@ from planning.handover.export.exported_rig import ExportedRig
 from planning.handover.export.mount_tables import MountTables
 from planning.handover.export.ros_files import roll_pitch_yaw
 from planning.handover.export.sheets.landmarks import Landmarks
+from planning.handover.export.usd_stage import UsdStage
 from planning.handover.export.write_exports import write_export
 from planning.model.errors import InputError
 from planning.rig.mounted import read_mounted
@@ -257,6 +258,30 @@ def test_usd_s_cameras_re_project_in_single_precision(rig, folder):
             lens = replace(device.lens, distortion=(0.0,) * 5)
             straight = replace(device.planned, device=lens)
         holds(replace(device, planned=straight), pose, matrix)
+
+
+@pytest.mark.parametrize(
+    ("up", "frame", "axis", "told"),
+    [
+        ([0.0, 1.0, 0.0], None, "Y", None),
+        ([0.0, 0.0, 1.0], "100,-50,30,40,0,0", "Z", None),
+        ([0.0, 0.0, 1.0], "0,0,0,0,0,90", "Y", None),
+        ([-1.0, 0.0, 0.0], None, "Z", "up is (-1, 0, 0) in this frame"),
+        ([0.0, -1.0, 0.0], None, "Z", "up is (0, -1, 0) in this frame"),
+        ([0.0, 0.0, 1.0], "0,0,0,0,20,0", "Z", "up is (0.342, 0, 0.9397) in this"),
+    ],
+)
+def test_usd_s_up_is_the_plan_s_or_is_told(rig, up, frame, axis, told):
+    def stood(document):
+        document["requirements"]["workspace"]["up"] = up
+
+    plan = changed(rig.plan, stood)
+    stage = ExportedRig.of(plan, frame_of(frame, plan.requirements.workspace))
+    text = UsdStage().files(stage)["rig.usda"].decode()
+    assert f'upAxis = "{axis}"' in text
+    found = [line for line in UsdStage().lacks(stage) if "upAxis" in line]
+    assert len(found) == (told is not None)
+    assert all(told in line for line in found)
 
 
 @pytest.mark.parametrize("frame", [None, "0,0,0"])
