@@ -135,6 +135,19 @@ def test_what_changed_is_planned_again(done, tmp_path, monkeypatch, how):
     assert sorted(begun) == ["broken.stl", "sub/block.obj"]
 
 
+def test_a_part_that_fails_now_doesn_t_show_its_older_plan(done, tmp_path, monkeypatch):
+    again = tmp_path / "copy"
+    shutil.copytree(done[0], again)
+    (again / "out" / "sub" / "block" / "report.html").write_text("of the older plan")
+    shown = ('href="sub/block/report.html"', "<img")
+    words = (again / "parts", "-o", again / "out", "--rig", again / "few.toml", *FAST)
+    _counted(monkeypatch)
+    for more, n in (("--no-report", 1), ("--again", 0)):
+        run(*words, more)
+        page = (again / "out" / "index.html").read_text()
+        assert [page.count(word) for word in shown] == [n, n]
+
+
 def test_an_interrupted_batch_keeps_what_ended(done, tmp_path, monkeypatch):
     place, _ = done
     files = {

@@ -34,7 +34,7 @@ def _page(rows: Sequence[Row], out: Path) -> str:
     cells = [_cells(row) for row in ordered]
     whole = table("Parts", _HEADS, cells, _NOTE)
     for row in ordered:
-        if (out / row.folder / PAGE).exists():
+        if _stands(row, out, PAGE):
             whole = linked(whole, row.part, f"{row.folder}/{PAGE}")
     met, missed = (sum(row.exit == code for row in rows) for code in (0, 1))
     failed = len(rows) - met - missed
@@ -84,11 +84,15 @@ def _percent(share: str) -> str:
     return f"{100.0 * float(share):.1f} %" if share else ""
 
 
+def _stands(row: Row, out: Path, name: str) -> bool:
+    # Where a part failed, its folder may hold an older plan, which its row isn't of.
+    return not row.failed and (out / row.folder / name).exists()
+
+
 def _picture(row: Row, out: Path) -> str:
-    path = out / row.folder / _PICTURE
-    if not path.exists():
+    if not _stands(row, out, _PICTURE):
         return ""
-    data = base64.b64encode(path.read_bytes()).decode()
+    data = base64.b64encode((out / row.folder / _PICTURE).read_bytes()).decode()
     image = element(
         "img", "", src=f"data:image/png;base64,{data}", alt=row.part, width="400"
     ).removesuffix("</img>")
