@@ -112,7 +112,10 @@ def test_a_later_run_leaves_what_is_finished(done, monkeypatch):
     assert "1 of 2 parts" in ended.stdout
 
 
-@pytest.mark.parametrize("how", ["option", "rig", "mesh", "again", "damaged"])
+CHANGES = ("option", "rig", "mesh", "again", "damaged", "cut", "gone")
+
+
+@pytest.mark.parametrize("how", CHANGES)
 def test_what_changed_is_planned_again(done, tmp_path, monkeypatch, how):
     place, _ = done
     begun = _counted(monkeypatch)
@@ -129,8 +132,12 @@ def test_what_changed_is_planned_again(done, tmp_path, monkeypatch, how):
             file.write("# another\n")
     elif how == "again":
         words.append("--again")
-    else:
+    elif how == "damaged":
         (again / "out" / "sub" / "block" / "surface.npz").write_bytes(b"damaged")
+    elif how == "cut":
+        os.truncate(again / "out" / "sub" / "block" / "rig.png", 1000)
+    else:
+        (again / "out" / "sub" / "block" / "rig.png").unlink()
     run(*words)
     assert sorted(begun) == ["broken.stl", "sub/block.obj"]
 
@@ -277,10 +284,26 @@ def test_a_table_is_read_as_it_was_written(done, tmp_path):
     assert read_rows(tmp_path) == before
     block = before["sub/block.obj"]
     assert is_whole(block, place / "out")
-    assert not is_whole(replace(block, digest="0"), place / "out")
+    assert not is_whole(replace(block, content="0"), place / "out")
     assert not is_whole(replace(block, exit=130), place / "out")
     (tmp_path / "batch.csv").write_text("no table")
     assert read_rows(tmp_path) == {}
+
+
+def test_a_plan_is_whole_by_its_own_files_alone(done, tmp_path):
+    plan = done[0] / "out" / "sub" / "block"
+    files = {path.name: path.read_bytes() for path in plan.iterdir()}
+    files |= {"patterns/sequence.json": b"{}", "patterns/P1/00.png": b"image"}
+    for name, content in files.items():
+        path = tmp_path / "a" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    row = row_of(PartEnd("a.stl", 0, "", 2.0, files), "a", tmp_path, "x")
+    (tmp_path / "a" / "export").mkdir()
+    (tmp_path / "a" / "cloud.ply").write_text("made later")
+    assert is_whole(row, tmp_path)
+    (tmp_path / "a" / "patterns" / "P1" / "00.png").unlink()
+    assert not is_whole(row, tmp_path)
 
 
 def test_a_part_that_failed_has_no_figures(tmp_path):

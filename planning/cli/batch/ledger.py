@@ -4,12 +4,11 @@ import csv
 import hashlib
 import io
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 
-from planning.model.errors import PlanFileError
 from planning.model.files import write_atomically
 from planning.model.plan import RigPlan
 from planning.report.summary.shortfall import missing
@@ -39,6 +38,8 @@ class Row:
         message: Why not, in a line.
         asked: Hash of the mesh file and of everything that is asked.
         digest: Of the plan (`RigPlan.digest`).
+        files: What its run wrote into the folder: files and folders, by their names.
+        content: Hash of all of it.
     """
 
     part: str
@@ -58,6 +59,8 @@ class Row:
     message: str = ""
     asked: str = ""
     digest: str = ""
+    files: str = ""
+    content: str = ""
 
     @property
     def failed(self) -> bool:
@@ -67,10 +70,14 @@ class Row:
 
 def asked_of(task: PartTask, version: str) -> str:
     """Return a hash of all that a part's plan follows from, hexadecimal."""
-    hashed = hashlib.sha256(json.dumps([version, *task.words]).encode())
-    for files in (task.mesh, task.rig):
-        for name, content in files.items():
-            hashed.update(f"{name}:{len(content)};".encode() + content)
+    words = json.dumps([version, *task.words])
+    return _hash_of(words, (*task.mesh.items(), *task.rig.items()))
+
+
+def _hash_of(words: str, files: Iterable[tuple[str, bytes]]) -> str:
+    hashed = hashlib.sha256(words.encode())
+    for name, content in files:
+        hashed.update(f"{name}:{len(content)};".encode() + content)
     return hashed.hexdigest()
 
 
@@ -88,8 +95,10 @@ def row_of(end: PartEnd, folder: str, out: Path, asked: str) -> Row:
     )
     if end.code not in (0, 1):
         return row
+    names = {name.split("/")[0] for name in end.files}
+    written, content = " ".join(sorted(names)), _hash_of("", sorted(end.files.items()))
     plan = RigPlan.load(out / folder / "plan.json")
-    return _with_plan(row, plan)
+    return _with_plan(replace(row, files=written, content=content), plan)
 
 
 def _with_plan(row: Row, plan: RigPlan) -> Row:
@@ -145,10 +154,18 @@ def read_rows(out: Path) -> Mapping[str, Row]:
     return rows
 
 
-def is_whole(row: Row, out: Path, files: Sequence[str] = ("plan.json",)) -> bool:
-    """Return whether the plan that a row tells of stands whole in its folder."""
+def is_whole(row: Row, out: Path) -> bool:
+    """Return whether all that a part's run wrote stands in its folder as it was."""
     if row.failed:
         return False
-    with suppress(PlanFileError, OSError):
-        return RigPlan.load(out / row.folder / files[0]).digest == row.digest
+    folder = out / row.folder
+    own = [folder / name for name in row.files.split()]
+    with suppress(OSError):
+        files = {
+            path.relative_to(folder).as_posix(): path.read_bytes()
+            for one in own
+            for path in (one, *one.rglob("*"))
+            if path.is_file()
+        }
+        return _hash_of("", sorted(files.items())) == row.content
     return False
