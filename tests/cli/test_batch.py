@@ -155,6 +155,26 @@ def test_a_part_that_fails_now_doesn_t_show_its_older_plan(done, tmp_path, monke
         assert [page.count(word) for word in shown] == [n, n]
 
 
+@pytest.mark.parametrize("how", ["stands", "gone", "taken"])
+def test_a_run_over_some_parts_keeps_the_rows_of_plans_that_stand(
+    done, tmp_path, monkeypatch, how
+):
+    again, _ = tmp_path / "copy", _counted(monkeypatch)
+    shutil.copytree(done[0], again)
+    broken, block = rows(again / "out")
+    # Where another part's plan goes, that of an older row doesn't stand.
+    name = "sub/block.stl" if how == "taken" else "other.stl"
+    (again / "one" / "sub").mkdir(parents=True)
+    (again / "one" / name).write_text("no mesh")
+    if how == "gone":
+        shutil.rmtree(again / "out" / "sub")
+    run(again / "one", "-o", again / "out", "--rig", again / "few.toml", *FAST)
+    kept = [row for row in rows(again / "out") if row["part"] != name]
+    assert kept == ([broken, block] if how == "stands" else [broken])
+    page = (again / "out" / "index.html").read_text()
+    assert f"Batch of {len(kept) + 1} parts" in page
+
+
 def test_an_interrupted_batch_keeps_what_ended(done, tmp_path, monkeypatch):
     place, _ = done
     files = {

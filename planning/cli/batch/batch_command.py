@@ -114,12 +114,19 @@ def _keep(files: Mapping[str, bytes], folder: Path) -> None:
 
 
 def _before(parts: Mapping[str, Part], out: Path) -> dict[str, Row]:
-    """Return the rows of an earlier run: of plans where these parts' go, or of none."""
-    return {
-        name: row
-        for name, row in read_rows(out).items()
-        if name in parts and row.folder in ("", parts[name].folder)
-    }
+    """Return the rows of earlier runs: these parts', and others' that still hold.
+
+    One holds where no plan is told of, or that plan stands where none of these goes.
+    """
+    folders = {part.folder for part in parts.values()}
+
+    def holds(row: Row) -> bool:
+        if row.part in parts:
+            return row.folder in ("", parts[row.part].folder)
+        stands = (out / row.folder / "plan.json").exists()
+        return row.failed or (stands and row.folder not in folders)
+
+    return {name: row for name, row in read_rows(out).items() if holds(row)}
 
 
 def batch_command(
