@@ -16,6 +16,7 @@ from support.little_work import LITTLE, found_path
 from support.plain_shapes import box
 
 from planning.cli.batch import batch_command, part_task, runners
+from planning.cli.batch.index_page import write_index
 from planning.cli.batch.ledger import is_whole, read_rows, row_of, write_rows
 from planning.cli.batch.part_task import PartEnd, PartTask, plan_part
 from planning.cli.batch.parts import find_parts
@@ -308,6 +309,21 @@ def test_a_table_is_read_as_it_was_written(done, tmp_path):
     assert not is_whole(replace(block, exit=130), place / "out")
     (tmp_path / "batch.csv").write_text("no table")
     assert read_rows(tmp_path) == {}
+
+
+def test_a_row_tells_how_many_are_needed_not_how_many_there_may_be(tmp_path, handmade):
+    def short(document):
+        for proof in document["certificates"].values():
+            proof["needed"] = {"count": 7, "lower_bound": 6}
+
+    plan = handmade.tampered(handmade.build_plan(), short)
+    (tmp_path / "a").mkdir()
+    handmade.save(plan, tmp_path / "a")
+    row = row_of(PartEnd("a.stl", 1, "", 2.0, {}), "a", tmp_path, "x")
+    assert (row.projectors_least, row.cameras_least) == ("6", "6")
+    write_index([row], tmp_path)
+    page = (tmp_path / "index.html").read_text()
+    assert page.count(f"{len(plan.cameras)}, at least 6") == 2
 
 
 def test_a_plan_is_whole_by_its_own_files_alone(done, tmp_path):

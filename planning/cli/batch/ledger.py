@@ -28,7 +28,8 @@ class Row:
         folder: Of its plan.
         exit: Of its run.
         verdict: In a word or two.
-        projectors_least: Proved over the candidates; of cameras likewise.
+        projectors_least: Needed, as proved over the candidates, however many there
+            may be; of cameras likewise.
         lit: Share of what projectors can reach of the target.
         measured: Share of what cameras can reach of what is lit.
         of_target: Measured share of the whole target.
@@ -110,9 +111,9 @@ def _with_plan(row: Row, plan: RigPlan) -> Row:
     return replace(
         row,
         projectors=str(len(plan.projectors)),
-        projectors_least="" if lights is None else str(lights.candidates.lower_bound),
+        projectors_least="" if lights is None else str(lights.needed.lower_bound),
         cameras=str(len(plan.cameras)),
-        cameras_least=str(proofs.cameras.candidates.lower_bound),
+        cameras_least=str(proofs.cameras.needed.lower_bound),
         lit=_share(areas.lit_m2, areas.reachable_by_projectors_m2),
         measured=_share(areas.measured_m2, areas.reachable_by_cameras_m2),
         of_target=_share(areas.measured_m2, areas.area_m2),
