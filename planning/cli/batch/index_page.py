@@ -19,8 +19,8 @@ _HEADS = (
     *("of the target", "check, rms [mm]", "time [s]", "why"),
 )
 _NOTE = (
-    "At least so many devices are needed, as proved over the candidates. Lit and measured: of "
-    "what can be; the target's area and more stand in batch.csv."
+    "At least so many devices are needed, as proved over the candidates. Lit and "
+    "measured: of what can be; the target's area and more stand in batch.csv."
 )
 
 
