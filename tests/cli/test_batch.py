@@ -390,6 +390,18 @@ def test_a_scheduler_that_isnt_there_is_one_line(done, tmp_path, monkeypatch):
     assert "no scheduler answers there" in ended.stderr
 
 
+@pytest.mark.parametrize("address", ["foo", "http://x:1", "tcp://"])
+def test_of_what_is_no_address_no_client_is_made(tmp_path, monkeypatch, address):
+    """Half made, one would wait 20 s for its own end and leave a traceback."""
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(distributed, "Client", lambda *_, **__: pytest.fail("made"))
+    (tmp_path / "a.stl").write_text("no mesh")
+    words = (tmp_path / "a.stl", "-o", tmp_path / "out", "--scheduler", address)
+    ended = run(*words, *FAST)
+    assert ended.exit_code == 2
+    assert f"--scheduler {address}: isn't an address (" in ended.stderr
+
+
 @pytest.mark.filterwarnings("ignore")
 def test_workers_of_a_cluster_plan_the_same(done, tmp_path):
     distributed = pytest.importorskip("distributed")

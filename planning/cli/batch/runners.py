@@ -52,13 +52,23 @@ def cluster(address: str) -> Generator[tuple[Runner, int]]:
             Client,
             as_completed,
         )
+        from distributed.comm.addressing import (  # pyright: ignore[reportMissingImports]
+            resolve_address,
+        )
     except ImportError:
         raise click.UsageError(
             f"--scheduler needs dask.distributed, which isn't there: {_EXTRA}"
         ) from None
     try:
+        # Of what is no address a client is half made, and waits for its own end.
+        resolve_address(address)
         client: Any = Client(address, timeout=_ANSWERS_S, set_as_default=False)
-    except (OSError, ValueError, TimeoutError) as error:
+    except ValueError as error:
+        raise click.UsageError(
+            f"--scheduler {address}: isn't an address ({_line(error)}); give it as "
+            f"tcp://host:8786"
+        ) from None
+    except (OSError, TimeoutError) as error:
         raise click.UsageError(
             f"--scheduler {address}: no scheduler answers there ({_line(error)}); "
             f"start one with `dask scheduler`, and workers with `dask worker {address}`"
