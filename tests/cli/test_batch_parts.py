@@ -131,6 +131,14 @@ def test_no_plans_folder_holds_another_ones(tmp_path):
     assert "a/patterns" in folders
 
 
+@pytest.mark.parametrize("given", [".", "..", "link"])
+def test_what_plans_hold_is_no_part(tmp_path, monkeypatch, begun, given):
+    monkeypatch.chdir(made(tmp_path, "in/a.obj", "in/out/a/cloud.ply") / "in")
+    (tmp_path / "in" / "link").symlink_to(tmp_path)
+    run(given, "-o", "../in/out")
+    assert [Path(name).name for name, _ in begun] == ["a.obj"]
+
+
 def test_two_files_of_one_name_are_two_parts(tmp_path, monkeypatch, begun):
     monkeypatch.chdir(
         made(tmp_path, "a/x.obj", "b/x.obj", "c/sub/y.obj", "d/sub/y.obj")

@@ -139,8 +139,8 @@ def batch_command(
         given: Folders, patterns and files of the parts.
         words: Options of each part's own command line.
     """
-    parts = {part.name: part for part in find_parts(given)}
     out = Path(options["output"])
+    parts = {part.name: part for part in find_parts(given, out)}
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -28,15 +28,20 @@ class Part:
     folder: str
 
 
-def find_parts(given: Sequence[str]) -> tuple[Part, ...]:
+def find_parts(given: Sequence[str], out: Path | None = None) -> tuple[Part, ...]:
     """Return the meshes in folders, of patterns, and those named, by their names.
+
+    Args:
+        given: Folders, patterns and files.
+        out: A folder of plans, whose clouds and exports are no parts of a folder
+            above it; None: there is none.
 
     Raises:
         InputError: If there are none.
     """
     found: dict[str, tuple[str, Path]] = {}
     for one in given:
-        for path, name in _below(one):
+        for path, name in _below(one, out and os.path.realpath(out)):
             found.setdefault(os.path.realpath(path), (name, path))
     if not found:
         raise InputError(
@@ -52,11 +57,12 @@ def find_parts(given: Sequence[str]) -> tuple[Part, ...]:
     )
 
 
-def _below(given: str) -> Iterator[tuple[Path, str]]:
+def _below(given: str, out: str | None) -> Iterator[tuple[Path, str]]:
     root = Path(given)
     if root.is_dir():
         for folder, below, names in os.walk(root):
-            below.sort()
+            places = {one: os.path.realpath(os.path.join(folder, one)) for one in below}
+            below[:] = sorted(one for one in below if places[one] != out)
             for name in sorted(names):
                 if is_mesh_name(name):
                     path = Path(folder) / name
