@@ -167,13 +167,18 @@ def reporter(*, quiet: bool) -> Report:
     return report
 
 
+def shows_bar(*, quiet: bool) -> bool:
+    """Return whether progress is shown as a bar: on a terminal."""
+    return not quiet and sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
+
+
 @contextmanager
 def progress(*, quiet: bool) -> Generator[Report]:
     """Give what shows progress on stderr: a bar on a terminal, else lines.
 
     A bar is gone when this ends, so that results stand alone.
     """
-    if quiet or not sys.stderr.isatty() or os.environ.get("TERM") == "dumb":
+    if not shows_bar(quiet=quiet):
         yield reporter(quiet=quiet)
         return
     from rich.console import Console

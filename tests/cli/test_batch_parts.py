@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import re
 import tempfile
 from pathlib import Path, PurePosixPath
 
@@ -10,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 from support.opencv_calibration import YAML
 
-from planning.cli.batch import part_task, runners
+from planning.cli.batch import part_task, parts_bar, runners
 from planning.cli.batch.part_task import PartEnd, PartTask, plan_part
 from planning.cli.batch.parts import find_parts
 from planning.cli.batch.sent_files import rig_files
@@ -129,6 +130,22 @@ def test_no_plans_folder_holds_another_ones(tmp_path):
     above = {str(each) for folder in folders for each in PurePosixPath(folder).parents}
     assert not above & {*folders}
     assert "a/patterns" in folders
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_a_terminal_shows_how_many_ended_and_what_runs(
+    tmp_path, monkeypatch, begun, terminal
+):
+    monkeypatch.setattr(parts_bar, "shows_bar", lambda *, quiet: terminal)
+    for name, value in (("FORCE_COLOR", "1"), ("TERM", "xterm"), ("COLUMNS", "100")):
+        monkeypatch.setenv(name, value)
+    ended = run(made(tmp_path / "in", "a.obj", "b.obj"), "-o", tmp_path / "out")
+    shown = re.sub(r"\x1b\[[^A-Za-z]*[A-Za-z]", "", ended.stderr)
+    lines = [f"plan: {name}: failed: not planned" for name in ("a.obj", "b.obj")]
+    first, second = (shown.index(line) for line in lines)
+    assert (" 0/2 a.obj" in shown[:first]) == terminal
+    assert (" 1/2 b.obj" in shown[first:second]) == terminal
+    assert ("/2" in shown) == terminal
 
 
 @pytest.mark.parametrize("given", [".", "..", "link"])

@@ -11,7 +11,7 @@ import click
 
 from geometry.parallel import n_threads
 from planning.cache.content import code_content
-from planning.cli.console import print_json, reporter
+from planning.cli.console import print_json
 from planning.cli.output_folder import exchanged
 from planning.model.errors import PlanningError
 from planning.model.progress import Report
@@ -23,6 +23,7 @@ from .ledger import NAME, Row, asked_of, is_whole, read_rows, row_of, write_rows
 from .part_names import one_line
 from .part_task import NO_FILE, PartEnd, PartTask, stop_parts
 from .parts import Part, find_parts
+from .parts_bar import Show, parts_progress
 from .runners import cluster, local
 from .sent_files import part_files, rig_files
 
@@ -40,6 +41,8 @@ class _Batch:
         before: Rows of an earlier run.
         rows: Of the parts that ended in this one, or are left as they are.
         asked: Hash of all that each part's plan follows from.
+        running: Names of the parts that were given away to be planned, and haven't
+            ended.
     """
 
     parts: Mapping[str, Part]
@@ -47,10 +50,12 @@ class _Batch:
     words: Sequence[str]
     rig: Mapping[str, bytes]
     report: Report
+    show: Show
     threads: int = 1
     before: Mapping[str, Row] = field(default_factory=dict[str, Row])
     rows: dict[str, Row] = field(default_factory=dict[str, Row])
     asked: dict[str, str] = field(default_factory=dict[str, str])
+    running: list[str] = field(default_factory=list[str])
 
     def task(self, part: Part) -> PartTask:
         """Return what is planned of a part."""
@@ -76,7 +81,10 @@ class _Batch:
             if row is not None and row.asked == asked and is_whole(row, self.out):
                 self.rows[part.name] = row
                 self.report(f"{part.name}: {row.verdict}, from an earlier run")
+                self.show(len(self.rows), self.running)
                 continue
+            self.running.append(part.name)
+            self.show(len(self.rows), self.running)
             yield task
 
     def end(self, end: PartEnd) -> None:
@@ -92,10 +100,13 @@ class _Batch:
             failed = replace(end, code=code, message=one_line(str(error)))
             row = row_of(failed, "", self.out, "")
         self.rows[end.name] = row
+        if end.name in self.running:
+            self.running.remove(end.name)
         self.write()
         why = f": {row.message}" if row.failed and row.message else ""
         n = f"{len(self.rows)} of {len(self.parts)}"
         self.report(f"{end.name}: {row.verdict}{why} ({n})")
+        self.show(len(self.rows), self.running)
 
     def write(self) -> None:
         """Write the table and the page of what ended so far, in earlier runs too."""
@@ -145,13 +156,14 @@ def batch_command(
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise click.UsageError(f"{out}: can't be written ({error.strerror})") from None
-    report = reporter(quiet=options["quiet"])
     rig = rig_files(options["rig_name"])
     jobs = options["jobs"] or max(1, n_threads() // 2)
     threads, before = max(1, n_threads() // jobs), _before(parts, out)
-    batch = _Batch(parts, out, words, rig, report, threads, before)
     interrupted = False
     with ExitStack() as stack:
+        bar = parts_progress(len(parts), quiet=options["quiet"])
+        report, show = stack.enter_context(bar)
+        batch = _Batch(parts, out, words, rig, report, show, threads, before)
         if options["scheduler"] is None:
             run = stack.enter_context(local(jobs))
         else:
