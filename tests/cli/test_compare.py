@@ -7,11 +7,51 @@ from click.testing import CliRunner
 
 from planning.cli.lines.comparison import compared, comparison_lines
 from planning.cli.main import commands
+from planning.model.document.request_records import RequestRecord
 
 
 @pytest.fixture(scope="module")
 def plan(handmade):
     return handmade.build_plan()
+
+
+REQUEST = {
+    "given": [],
+    "max_projectors": 4,
+    "max_cameras": None,
+    "max_heads": None,
+    "target": "dominant",
+    "pattern": "rings",
+    "dominant_coverage": 0.9,
+    "coverage": 0.95,
+    "min_reachable": 0.9,
+    "region_coverage": 0.0,
+    "accuracy_mm": None,
+    "accuracy_of": "total",
+    "up": "z",
+    "ring_axis": "centred",
+    "robust": None,
+    "views": None,
+    "survive": 0,
+    "joint": False,
+    "cameras_by": "both",
+}
+# What may be asked otherwise, and how it is told beside what `REQUEST` says.
+OTHERWISE = {
+    "max_projectors": (6, "projectors, at most", "4", "6"),
+    "max_cameras": (8, "cameras, at most", "-", "8"),
+    "max_heads": (2, "heads, at most", "-", "2"),
+    "min_reachable": (0.5, "reachable, asked", "90.0 %", "50.0 %"),
+    "region_coverage": (0.8, "of each region, asked", "0.0 %", "80.0 %"),
+    "accuracy_of": ("noise", "sigma, asked of", "total", "noise"),
+    "up": ("-x", "up", "z", "-x"),
+    "ring_axis": ("free", "ring axis, asked", "centred", "free"),
+    "robust": (0.8, "drawn rigs that meet it, asked", "-", "80.0 %"),
+    "views": (3, "views, asked", "-", "3"),
+    "survive": (1, "losses, asked", "0", "1"),
+    "joint": (True, "sought jointly", "no", "yes"),
+    "cameras_by": ("paper", "cameras by", "both", "paper"),
+}
 
 
 def _by_name(rows):
@@ -52,6 +92,32 @@ def test_what_only_one_says_stands_beside_a_dash(plan, handmade):
     for name in ("sigma, asked [mm]", "seconds of a scan"):
         assert rows[name].second == "-"
         assert rows[name].differs
+
+
+@pytest.mark.parametrize("key", OTHERWISE)
+def test_what_else_was_asked_is_told_where_it_differs(plan, handmade, key):
+    value, name, first, second = OTHERWISE[key]
+    sides = [
+        handmade.tampered(plan, lambda document, asked=asked: document.update(asked))
+        for asked in ({"request": REQUEST}, {"request": REQUEST | {key: value}})
+    ]
+    rows = compared(*sides)
+    (row,) = [row for row in rows if row.differs]
+    assert (row.what, row.first, row.second) == (name, first, second)
+    # Nothing is said of what neither plan's command changed.
+    assert len(rows) == len(compared(plan, plan)) + 1
+
+
+def test_all_that_was_asked_is_told():
+    """A new key of `request` has a row, or one of `requirements` that says the same."""
+    elsewhere = {"given", "target", "pattern", "dominant_coverage", "coverage"}
+    assert {*RequestRecord.model_fields} == {*OTHERWISE, *elsewhere, "accuracy_mm"}
+
+
+def test_the_other_light_is_told(plan, handmade):
+    rows = compared(plan, handmade.build_plan(light="parallel"))
+    (row,) = [row for row in rows if row.what == "light"]
+    assert (row.first, row.second) == ("diverging", "parallel")
 
 
 def test_the_table_lines_up_and_marks(plan, handmade):

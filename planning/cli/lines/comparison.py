@@ -16,6 +16,22 @@ from planning.report.summary.shortfall import missing
 _NONE = "-"
 # Poses are written to 0.01 mm; a turn by as much over a metre.
 _SAME = 2e-5
+# What else may be asked, by its key in the plan's `request`.
+_REQUEST = {
+    "max_projectors": "projectors, at most",
+    "max_cameras": "cameras, at most",
+    "max_heads": "heads, at most",
+    "min_reachable": "reachable, asked",
+    "region_coverage": "of each region, asked",
+    "accuracy_of": "sigma, asked of",
+    "up": "up",
+    "ring_axis": "ring axis, asked",
+    "robust": "drawn rigs that meet it, asked",
+    "views": "views, asked",
+    "survive": "losses, asked",
+    "joint": "sought jointly",
+    "cameras_by": "cameras by",
+}
 
 
 @dataclass(frozen=True)
@@ -33,13 +49,16 @@ class Row:
 
 
 def compared(first: RigPlan, second: RigPlan) -> list[Row]:
-    """Return what two plans say of the same, row by row."""
+    """Return what two plans say of the same, row by row.
+
+    What is asked seldom has a row only where it differs.
+    """
     rows: list[Row] = []
-    for part in (_asked, _devices, _coverage, _check):
+    for part in (_asked, _asked_else, _devices, _coverage, _check):
         sides = dict(part(first)), dict(part(second))
         for name in dict.fromkeys((*sides[0], *sides[1])):
             row = Row(name, *(side.get(name) or _NONE for side in sides))
-            if (row.first, row.second) != (_NONE, _NONE):
+            if row.differs or (row.first != _NONE and part is not _asked_else):
                 rows.append(row)
     shared = str(_same_places(first, second))
     return [*rows, Row("devices at the same place", shared, shared)]
@@ -74,6 +93,22 @@ def _asked(plan: RigPlan) -> Iterator[tuple[str, str]]:
     yield "measured, asked", percent(asked.coverage)
     yield "sigma, asked [mm]", _mm(asked.triangulation.max_sigma_m)
     yield "requirements missed", str(len(list(missing(plan))))
+
+
+def _asked_else(plan: RigPlan) -> Iterator[tuple[str, str]]:
+    request = plan.document.request
+    yield "light", plan.document.rig.light
+    if request is not None:
+        for key, name in _REQUEST.items():
+            yield name, _words(getattr(request, key))
+
+
+def _words(value: str | float | bool | None) -> str:
+    if value is None:
+        return _NONE
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return percent(value) if isinstance(value, float) else str(value)
 
 
 def _devices(plan: RigPlan) -> Iterator[tuple[str, str]]:
