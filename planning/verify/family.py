@@ -10,7 +10,7 @@ from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.devices.workspace_claims import audit_ball
 from planning.verify.audit.rings.axis_claims import audit_centred
-from planning.verify.audit.rings.ring_claims import audit_left_out
+from planning.verify.audit.rings.ring_claims import audit_served
 
 # Of the document of a member these are its own, and differ from the family's.
 _OWN = frozenset(
@@ -54,7 +54,7 @@ def audit_family(plan: RigPlan, cases: Sequence[AuditCase]) -> tuple[str, ...]:
         audit_centred(cases, findings.at("ring_axes"))
     for m, case in enumerate(cases):
         if m not in left:
-            audit_left_out(case, findings.at(f"members.{m}"))
+            audit_served(case, findings.at(f"members.{m}"))
     least = family.quantile * n * (1.0 - _SLACK)
     asked = family.n_asked >= least and n - len(left) >= family.n_asked
     findings.holds(

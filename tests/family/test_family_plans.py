@@ -76,6 +76,19 @@ def kept(both, tmp_path_factory):
     return path
 
 
+@pytest.fixture(scope="module")
+def wide(rig, few):
+    """Of three members a wide one, which takes two projectors, is left out."""
+    larger, smaller = grid(0.3, 0.3, divisions=(8, 8)), 0.8
+    x, z, _ = larger.vertices.T
+    front = np.column_stack([-x, np.full(len(x), 0.03), z])
+    back = front * (smaller, -1.0, smaller)
+    apart = TriangleMesh.joined(
+        [TriangleMesh(front, larger.faces), TriangleMesh(back, larger.faces[:, ::-1])]
+    )
+    return planned(rig, [plate(1), apart, plate(1, 0.04)], family_quantile=0.6)
+
+
 def test_plates_that_face_apart_take_twice_what_one_takes(both, rig, few):
     alone = plan_rig(
         plate(1), rig, max_projectors=4, target="surface", check=False, threads=1
@@ -212,19 +225,32 @@ def _moved(plan):
     return RigPlan(plan.document, plan.surface, (moved, *others))
 
 
-def _with_a_ring_left_out(plan):
-    """A ring that lights the surface is called idle, in all members alike."""
+def _with_first_projector(plan, changed):
+    """The first projector is another one, in all members alike."""
 
-    def without(document):
+    def other(document):
         first, *others = document.projectors
-        radii = list(first.ring_radii)
-        gone = radii.pop(len(radii) // 2)
-        rings = first.rings.changed(left_out=(gone,))
-        changed = first.changed(ring_radii=tuple(radii), rings=rings)
-        return document.changed(projectors=(changed, *others))
+        return document.changed(projectors=(changed(first), *others))
 
-    members = tuple(RigPlan(without(m.document), m.surface) for m in plan.members)
-    return RigPlan(without(plan.document), plan.surface, members)
+    members = tuple(RigPlan(other(m.document), m.surface) for m in plan.members)
+    return RigPlan(other(plan.document), plan.surface, members)
+
+
+def _with_a_ring_left_out(first):
+    """A ring that lights the surface is called idle."""
+    radii = list(first.ring_radii)
+    gone = radii.pop(len(radii) // 2)
+    rings = first.rings.changed(left_out=(gone,))
+    return first.changed(ring_radii=tuple(radii), rings=rings)
+
+
+def _with_closer_even_rings(first):
+    """As many even rings are claimed as would stand closer than those shown."""
+    return first.changed(rings=first.rings.changed(n_even=2 * first.rings.n_even))
+
+
+def _cases(plan):
+    return [examine(m, seed=0, threads=1, n_samples=1000) for m in plan.members]
 
 
 def _better(plan):
@@ -260,8 +286,8 @@ FALSE = {
 
 def test_a_ring_that_lights_a_served_member_is_not_idle(both):
     """It may light one that needn't be served."""
-    forged = _with_a_ring_left_out(both)
-    cases = [examine(m, seed=0, threads=1, n_samples=1000) for m in forged.members]
+    forged = _with_first_projector(both, _with_a_ring_left_out)
+    cases = _cases(forged)
     lit = [bool(case.actual.lit_by[0].any()) for case in cases]
     (one,) = np.flatnonzero(lit)
     words = f"members.{one}.P1.rings.left_out: 1 rings light"
@@ -270,6 +296,20 @@ def test_a_ring_that_lights_a_served_member_is_not_idle(both):
     mine = f"members.{one}.P1.rings.left_out"
     assert not any(mine in line for line in audit_family(aside, cases))
     assert not any("left_out: 1" in m for m in audit_plan(forged.members[one]).failures)
+
+
+def test_rings_are_spaced_for_those_served_and_may_be_wide_on_others(wide):
+    """A few rings light it: it is larger, and rings beyond the others are left out."""
+    assert wide.document.family.left_out == (1,)
+    rings = wide.members[1].document.projectors[0].rings
+    assert rings.left_out
+    assert rings.gap_m[1] > 2.0 * wide.document.projectors[0].rings.gap_m[1]
+    assert verify_plan(wide, check_pixels=False, threads=1).failures == ()
+    forged = _with_first_projector(wide, _with_closer_even_rings)
+    false = [line for line in audit_family(forged, _cases(forged)) if "n_even" in line]
+    assert [line.split(":")[0] for line in false] == [
+        f"members.{m}.P1.rings.n_even" for m in (0, 2)
+    ]
 
 
 @pytest.mark.parametrize("name", FALSE)

@@ -64,13 +64,14 @@ def outsider_needs(
 ) -> MemberNeeds:
     """Return the same of a member that the family's rig needn't serve.
 
-    Its samples are those of `draws`, for projectors and cameras.
+    Its samples are those of `draws`, for projectors and cameras. Rings that light none
+    of the members served don't light it either.
     """
-    scene = ready.scene
+    scene, shown = ready.scene, partial.final_projectors
     candidates = CandidateSet.over(scene, draws[0], partial.stage.reference)
-    among = scene.among(partial.projectors)
+    among = scene.among(shown)
     views = CandidateViews(among, partial.camera_stage.reference)
-    samples, measured = measured_of(among, partial.projectors, views, draws[1])
+    samples, measured = measured_of(among, shown, views, draws[1])
     return _needs(ready, partial, candidates, views, samples, measured)
 
 

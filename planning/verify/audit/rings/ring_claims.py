@@ -91,7 +91,9 @@ def _audit_spacing(
     )
     if not findings.holds(count >= 2, "n_even", f"{count!r} must be at least 2 rings"):
         return
-    every, even = _every_and_even(rings, projector)
+    # What is told of rings is of all that were spaced, shown or left out.
+    projector, even = _all_and_even(rings, projector)
+    every = projector.radii
     findings.holds(
         spacing != "uniform"
         or (
@@ -103,10 +105,12 @@ def _audit_spacing(
         f"claimed",
     )
     grid = cast_rings(case, projector, _rows(even))
-    _audit_gaps(rings, even, grid, findings)
-    # Those of a family may light another member, or one that needn't be served.
-    if "left_out" in rings.model_fields_set and not case.plan.of_member:
-        _audit_idle(every, np.array(rings.left_out), grid, case, findings)
+    _audit_gaps(rings, grid, findings)
+    # A family spaces rings for the members that it serves: only it knows which.
+    if not case.plan.of_member:
+        _audit_widest(rings, even, grid, findings)
+        if "left_out" in rings.model_fields_set:
+            _audit_idle(rings, grid, case, findings)
     limits = case.plan.requirements
     sigma = limits.triangulation.max_sigma_m
     tolerance = limits.check.max_p95_m if sigma is None else sigma
@@ -119,26 +123,30 @@ def _audit_spacing(
     audit_creases(rings.creases, case, projector, creases, findings.at("creases"))
 
 
-def audit_left_out(case: AuditCase, findings: AuditFindings) -> None:
-    """Check that rings which a family leaves out light nothing of a member served."""
+def audit_served(case: AuditCase, findings: AuditFindings) -> None:
+    """Check what a family's rings owe to a member that is served.
+
+    No gap on it is wider than an even one, and no ring that is left out lights it.
+    """
     records = case.plan.document.projectors
     for record, projector in zip(records, case.projectors, strict=True):
-        rings = record.rings
-        if rings is None or not rings.left_out:
+        rings, below = record.rings, findings.at(f"{record.id}.rings")
+        if rings is None or rings.n_even < 2:
             continue
-        every, even = _every_and_even(rings, projector)
-        grid = cast_rings(case, projector, _rows(even))
-        left_out, below = np.array(rings.left_out), findings.at(f"{record.id}.rings")
-        _audit_idle(every, left_out, grid, case, below, hidden_alone=True)
+        whole, even = _all_and_even(rings, projector)
+        grid = cast_rings(case, whole, _rows(even))
+        _audit_widest(rings, even, grid, below)
+        if rings.left_out:
+            _audit_idle(rings, grid, case, below, hidden_alone=True)
 
 
-def _every_and_even(
+def _all_and_even(
     rings: RingsRecord, projector: AuditProjector
-) -> tuple[Array, Array]:
+) -> tuple[AuditProjector, Array]:
     """Return all rings, shown or left out, and as far as they reach the even ones."""
     every = np.sort(np.concatenate([projector.radii, rings.left_out]))
     even = float(every[-1]) * np.arange(1, rings.n_even + 1) / rings.n_even
-    return every, even
+    return replace(projector, radii=every), even
 
 
 def _rows(even: Array) -> Array:
@@ -146,16 +154,25 @@ def _rows(even: Array) -> Array:
     return np.arange(1, ROWS * len(even) + 1) * (even[0] / ROWS)
 
 
-def _audit_gaps(
+def _audit_gaps(rings: RingsRecord, grid: RingGrid, findings: AuditFindings) -> None:
+    """Check `gap_m`, the least and largest distance of rings on lit surface."""
+    points = _lit_points(grid)
+    if len(points) == 0:
+        return
+    if rings.gap_m is None:
+        findings.fail("gap_m", "is missing")
+        return
+    gaps, alike = grid.projector.ring_spacing(points), np.ones(len(points))
+    for place, largest in enumerate((False, True)):
+        name, claimed = f"gap_m.{place}", rings.gap_m[place]
+        audit_extreme(name, claimed, gaps, alike, findings, largest=largest)
+
+
+def _audit_widest(
     rings: RingsRecord, even: Array, grid: RingGrid, findings: AuditFindings
 ) -> None:
-    """Check `gap_m`, the least and largest distance of rings on lit surface.
-
-    No gap there is wider than an even one: that bounds `n_even`.
-    """
-    # Rounding decides whether the last row lies inside the last ring.
-    inner = grid.rays < (len(grid.coordinates) - 1) * AZIMUTHS
-    points = grid.samples.points[grid.lit & inner]
+    """Check that no gap on lit surface is wider than an even one: bounds `n_even`."""
+    points = _lit_points(grid)
     if len(points) == 0:
         return
     gaps = grid.projector.ring_spacing(points)
@@ -167,18 +184,16 @@ def _audit_gaps(
         f"{len(even)} even rings stand closer than the plan's on {100 * share:.3g} % "
         f"of its light on the surface, nowhere may they",
     )
-    if rings.gap_m is None:
-        findings.fail("gap_m", "is missing")
-        return
-    alike = np.ones(len(gaps))
-    for place, largest in enumerate((False, True)):
-        name, claimed = f"gap_m.{place}", rings.gap_m[place]
-        audit_extreme(name, claimed, gaps, alike, findings, largest=largest)
+
+
+def _lit_points(grid: RingGrid) -> Array:
+    """Return lit points inside the last row, (n, 3): rounding decides about that."""
+    inner = grid.rays < (len(grid.coordinates) - 1) * AZIMUTHS
+    return grid.samples.points[grid.lit & inner]
 
 
 def _audit_idle(
-    every: Array,
-    left_out: Array,
+    rings: RingsRecord,
     grid: RingGrid,
     case: AuditCase,
     findings: AuditFindings,
@@ -192,6 +207,7 @@ def _audit_idle(
     row of the grid is left to rounding.
     """
     rig, projector = case.plan.document.rig, grid.projector
+    every, left_out = projector.radii, np.array(rings.left_out)
     margin = projector.light.coordinate_of(
         float(rig.rings.get("margin_m", 0.0)), rig.standoff_m or 1.0
     )
