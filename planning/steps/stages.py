@@ -123,7 +123,7 @@ def placed(
 def _say_count(
     stage: ProjectorStage | CameraStage, devices: Sequence[object], clock: Stopwatch
 ) -> None:
-    bound = stage.certificate.candidates.lower_bound
+    bound = stage.certificate.needed.lower_bound
     words = f"{len(devices)} of {len(stage.reference)} candidates"
     clock.say(f"  {words}; at least {bound} are needed")
 

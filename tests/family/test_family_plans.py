@@ -104,8 +104,12 @@ def test_plates_that_face_apart_take_twice_what_one_takes(both, rig, few):
 
 def test_a_member_that_is_short_of_devices_says_what_it_takes(rig, few):
     """One device can't serve plates back to back; the other member takes one."""
+    said: list[str] = []
     pair = TriangleMesh.joined([plate(1), plate(-1, 0.04)])
-    family = planned(rig, [pair, plate(1)], max_projectors=1)
+    family = planned(rig, [pair, plate(1)], max_projectors=1, progress=said.append)
+    told = family.document.family.projectors
+    assert (told.count, told.needed, told.lower_bound) == (1, 2, 2)
+    assert any("1 of" in line and "at least 2 are needed" in line for line in said)
     short, served = family.members
     proof = short.document.certificates.projectors
     assert (proof.status, proof.count) == ("infeasible", 1)
@@ -114,8 +118,9 @@ def test_a_member_that_is_short_of_devices_says_what_it_takes(rig, few):
     assert proof.best_area.value_m2 == pytest.approx(areas.lit_m2, rel=0.05)
     assert proof.best_area.upper_bound_m2 < proof.required_m2
     assert served.document.certificates.projectors.status == "optimal"
-    for member in family.members:
-        assert verify_plan(member, check_pixels=False).failures == ()
+    # So much was claimed once: no more than there are.
+    for plan in (family, _bounded(family, "projectors", lower_bound=1)):
+        assert verify_plan(plan, check_pixels=False, threads=1).failures == ()
 
 
 @pytest.mark.long
@@ -270,6 +275,10 @@ FALSE = {
     "a served one is left out": (lambda p: _with_family(p, left_out=(0, 1)), "family"),
     "a bound raised": (lambda p: _bounded(p, "cameras", lower_bound=3), "lower_bound"),
     "a bound lowered": (lambda p: _bounded(p, "cameras", lower_bound=0), "lower_bound"),
+    "more needed than are enough": (
+        lambda p: _bounded(p, "cameras", needed=3, lower_bound=3),
+        "lower_bound: 3 is more than 2, which are enough",
+    ),
     "a bound over poses raised": (
         lambda p: _bounded(
             p,

@@ -136,15 +136,15 @@ def _count(
         for m, proof in enumerate(members)
         if proof.continuous is not None
     )[left : left + 1]
-    own = sorted((-proof.candidates.lower_bound, m) for m, proof in enumerate(members))
+    own = sorted((-proof.needed.lower_bound, m) for m, proof in enumerate(members))
     least, member = -own[left][0], own[left][1]
     proof = f"member {member}: {members[member].candidates.proof}"
-    if left == 0 and together.candidates.lower_bound >= least:
-        least, proof = together.candidates.lower_bound, together.candidates.proof
+    if left == 0 and together.needed.lower_bound >= least:
+        least, proof = together.needed.lower_bound, together.candidates.proof
     return FamilyCount(
         count=count,
         needed=together.needed.count,
-        lower_bound=min(least, count),
+        lower_bound=min(least, together.needed.count),
         n_candidates=together.candidates.n_candidates,
         n_samples=together.n_samples,
         proof=proof,
