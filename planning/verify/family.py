@@ -6,6 +6,7 @@ from typing import Any
 from geometry.mesh.mesh import TriangleMesh
 from planning.model.document.family_records import FamilyCount
 from planning.model.plan import RigPlan
+from planning.verify.audit.audit import unmet_requirements
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.devices.workspace_claims import audit_ball
@@ -66,19 +67,43 @@ def audit_family(plan: RigPlan, cases: Sequence[AuditCase]) -> tuple[str, ...]:
         f"{n - len(left)} of {n} members are served, {family.n_asked} are said to be "
         f"asked, and {family.quantile:g} of {n} are",
     )
-    served = [m for m in range(n) if m not in left]
-    shares = {m: met(members[m]) for m in served}
-    lowest = min(shares.values())
-    findings.holds(
-        shares[family.worst] <= lowest + _SLACK,
-        "family.worst",
-        f"member {family.worst} meets {shares[family.worst]:.6g} of what is asked, "
-        f"another only {lowest:.6g}",
-    )
+    _audit_worst(family.worst, [m for m in range(n) if m not in left], plan, findings)
     spare = n - family.n_asked
     _audit_count(plan, "projectors", spare, findings)
     _audit_count(plan, "cameras", spare, findings)
     return findings.failures
+
+
+def _audit_worst(
+    worst: int, served: Sequence[int], plan: RigPlan, findings: AuditFindings
+) -> None:
+    """Check that the worst member misses a requirement if any member served does.
+
+    And that of such, or of all if none does, the smallest share of what is asked is met
+    of it.
+    """
+    short = [m for m in served if _falls_short(plan.members[m])]
+    named = findings.holds(
+        not short or worst in short,
+        "family.worst",
+        f"member {worst} misses no requirement, members {short} do",
+    )
+    if not named:
+        return
+    shares = {m: met(plan.members[m]) for m in short or served}
+    lowest = min(shares.values())
+    findings.holds(
+        shares[worst] <= lowest + _SLACK,
+        "family.worst",
+        f"member {worst} meets {shares[worst]:.6g} of what is asked, another only "
+        f"{lowest:.6g}",
+    )
+
+
+def _falls_short(plan: RigPlan) -> bool:
+    """Whether a member misses a requirement, or failed its check, by its own claims."""
+    check = plan.document.reconstruction
+    return bool(unmet_requirements(plan)) or (check is not None and not check.passed)
 
 
 def met(plan: RigPlan) -> float:

@@ -15,7 +15,8 @@ from planning.cli.lines.comparison import compared
 from planning.cli.main import commands
 from planning.cli.output_folder import exchanged
 from planning.model.errors import InputError, PlanFileError
-from planning.steps.family.family_plan import family_plan, met
+from planning.report.summary.shortfall import shortfalls
+from planning.steps.family.family_plan import family_plan, met, with_members
 from planning.verify.audit.audit import audit_plan
 from planning.verify.audit.audit_case import examine
 from planning.verify.family import audit_family
@@ -156,6 +157,61 @@ def test_the_share_of_members_that_is_asked_saves_devices(rig, few):
     verified = verify_plan(half, threads=1)
     assert (verified.passed, verified.unmet) == (True, ())
     assert len(verified.members[1][1].missed) == 1
+
+
+@pytest.fixture(scope="module")
+def shut():
+    """A plate, and behind it two that stand face to face: no light falls between."""
+    flat = plate(1)
+    moved = flat.vertices - (0.0, 0.03, 0.0)
+    facing = TriangleMesh(moved + (0.0, 0.001, 0.0), flat.faces[:, ::-1])
+    return TriangleMesh.joined([flat, TriangleMesh(moved, flat.faces), facing])
+
+
+def test_a_member_that_no_light_reaches_is_left_out_before_one_that_costs(
+    rig, few, shut
+):
+    """It costs no device, but none serves it."""
+    family = planned(
+        *(rig, [plate(1), plate(-1), shut]), family_quantile=0.6, pattern="dense"
+    )
+    assert family.document.family.left_out == (2,)
+    assert (len(family.projectors), family.missed) == (2, ())
+    verified = verify_plan(family, check_pixels=False, threads=1)
+    assert (verified.failures, verified.unmet) == ((), ())
+
+
+def test_the_worst_member_is_one_that_misses_something(rig, few, shut):
+    family = planned(rig, [plate(1), shut], pattern="dense")
+    assert family.document.family.worst == 1
+    assert [line.split(":")[0] for line in family.missed] == ["member-2"]
+    assert audit_family(family, _cases(family)) == ()
+    best = _with_family(family, worst=0)
+    words = "member 0 misses no requirement, members [1] do"
+    assert any(words in line for line in audit_family(best, _cases(best)))
+
+
+def _with_failed_check(plan):
+    check = verify_plan(plan, threads=1).reconstruction.record()
+    failed = check.changed(passed=False, failures=("too few points",))
+    return RigPlan(plan.document.changed(reconstruction=failed), plan.surface)
+
+
+def test_a_member_that_fails_its_check_is_left_out_if_enough_others_are_well(both):
+    worst = both.document.family.worst
+    best, members = 1 - worst, list(both.members)
+    members[best] = _with_failed_check(members[best])
+    half = _with_family(both, quantile=0.5, n_asked=1)
+    for plan, left, shown, missed in ((half, (best,), worst, 0), (both, (), best, 1)):
+        told = with_members(plan, members)
+        family = told.document.family
+        assert (family.left_out, family.worst) == (left, shown)
+        assert len(shortfalls(told)) == missed
+        false = audit_family(told, _cases(told))
+        assert not any("worst" in line or "n_asked" in line for line in false)
+    # None is, where they are more than may be left out.
+    members[worst] = _with_failed_check(members[worst])
+    assert with_members(half, members).document.family.left_out == ()
 
 
 def test_a_family_is_compared_by_its_worst_member_and_says_of_how_many(both):

@@ -72,8 +72,9 @@ class FamilyRecord(Part):
         align: How the members were laid over each other.
         quantile: Share of the members that must be served.
         n_asked: Members that this is.
-        worst: Index of the served member of which the smallest share of what is asked
-            is met; the rest of the plan is of this one.
+        worst: Index of the served member that misses a requirement, if any does, and of
+            which the smallest share of what is asked is met; the rest of the plan is of
+            this one.
         left_out: Indices of members that the rig needn't serve.
         projectors: Of their number; `cameras` likewise.
     """

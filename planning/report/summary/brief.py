@@ -91,7 +91,7 @@ def _head(plan: RigPlan, short: Sequence[Shortfall]) -> Iterator[Block]:
     up = axis_name(plan.requirements.workspace.up)
     if plan.members:
         worst = document.members[document.family.worst].name if document.family else ""
-        yield "", f"below: {worst}, the member of which least is covered", 1
+        yield "", f"below: {worst}, the worst member", 1
     yield (
         "",
         f"{x:.0f} x {y:.0f} x {z:.0f} mm, up {up}, rig {rig.name}; target: "

@@ -10,6 +10,7 @@ from planning.model.document.family_records import AlignmentRecord, FamilyRecord
 from planning.model.document.plan_document import MemberRecord
 from planning.model.plan import RigPlan, member_path
 from planning.model.requirements import Requirements
+from planning.report.summary.shortfall import missing
 
 
 def family_plan(
@@ -20,12 +21,17 @@ def family_plan(
 ) -> RigPlan:
     """Return the plan of a family from those of its members, of the same devices.
 
-    Its claims are those of the served member of which the smallest share of what is
-    asked is met.
+    Members that miss a requirement are left out too, if all of these may be. Its claims
+    are those of the worst member served: one that misses a requirement, if any does,
+    and of such the one of which the smallest share of what is asked is met.
     """
     members = [_named(plan, name) for plan, name in zip(members, names, strict=True)]
     served = [m for m in range(len(members)) if m not in record.left_out]
-    worst = min(served, key=lambda m: (met(members[m]), m))
+    short = {m for m in served if any(missing(members[m]))}
+    if len(short) <= len(served) - record.n_asked:
+        served = [m for m in served if m not in short]
+    worst = min(served, key=lambda m: (m not in short, met(members[m]), m))
+    left_out = tuple(m for m in range(len(members)) if m not in served)
     shown = members[worst]
     n_faces = len(shown.surface.mesh.faces)
     surface = replace(shown.surface, member=np.full(n_faces, worst, dtype=np.int64))
@@ -48,7 +54,7 @@ def family_plan(
         meshes=tuple(plan.document.meshes[0] for plan in members),
         surface=shown.document.surface.changed(sha256=surface.sha256()),
         members=records,
-        family=record.changed(worst=worst),
+        family=record.changed(worst=worst, left_out=left_out),
     )
     return RigPlan(document, surface, tuple(members))
 

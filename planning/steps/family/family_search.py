@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from planning.cameras.camera_cover import candidate_cover
 from planning.model.document.family_records import FamilyRecord
 from planning.model.plan import RigPlan
@@ -24,9 +22,11 @@ from planning.steps.stages import (
 
 from .family_plan import family_plan
 from .family_proofs import FamilyProofs
-from .left_out import costly_members
+from .left_out import costly_members, unreachable_members
 from .member_stages import member_partial
 from .prepared_family import PreparedFamily, prepared_family
+
+_COSTLY = "which cost more"
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,9 +73,8 @@ def family_sought(
     family = prepared_family(request, clock)
     family, stage = _projectors(family, clock)
     partial = placed(family.ready, stage, clock)
-    fewer = _without_costly_views(family, partial)
+    fewer = _without_costly_views(family, partial, clock)
     if fewer.served != family.served:
-        _say_left_out(fewer, clock)
         family = fewer
         stage = first_projectors(family.ready, clock)
         partial = placed(family.ready, stage, clock)
@@ -94,41 +93,47 @@ def family_sought(
 def _projectors(
     family: PreparedFamily, clock: Stopwatch
 ) -> tuple[PreparedFamily, ProjectorStage]:
-    """The fewest projectors, without members that cost some and may be left out."""
+    """The fewest projectors, without members that may be left out.
+
+    Those of which too little can be lit first, then those that cost projectors.
+    """
     stage = first_projectors(family.ready, clock)
-    allowed = len(family.served) - family.asked.n_asked
-    if not allowed:
+    dark = unreachable_members(stage.candidates, len(family.served), family.spare)
+    if dark:
+        family = _without(family, dark, "too little of which can be lit", clock)
+        stage = first_projectors(family.ready, clock)
+    if not family.spare:
         return family, stage
-    cover = stage.candidates.cover
-    costly = costly_members(cover, stage.certificate.needed.count, allowed)
+    needed = stage.certificate.needed.count
+    costly = costly_members(stage.candidates.cover, needed, family.spare)
     if not costly:
         return family, stage
-    family = family.without(sorted(costly))
-    _say_left_out(family, clock)
+    family = _without(family, costly, _COSTLY, clock)
     return family, first_projectors(family.ready, clock)
 
 
 def _without_costly_views(
-    family: PreparedFamily, partial: PartialPlan
+    family: PreparedFamily, partial: PartialPlan, clock: Stopwatch
 ) -> PreparedFamily:
     """The family without members that cost cameras, as far as any may be left out."""
-    allowed = len(family.served) - family.asked.n_asked
-    if not allowed:
+    if not family.spare:
         return family
     stage = partial.camera_stage
     cover = candidate_cover(
         partial.scene, stage.cover.measured, stage.cover.samples, stage.reference
     )
     needed = stage.certificate.needed.count
-    return family.without(sorted(costly_members(cover, needed, allowed)))
+    costly = costly_members(cover, needed, family.spare)
+    return _without(family, costly, _COSTLY, clock) if costly else family
 
 
-def _say_left_out(family: PreparedFamily, clock: Stopwatch) -> None:
-    left = np.setdiff1d(np.arange(len(family.members)), family.served)
-    names = ", ".join(family.asked.names[i] for i in left)
-    clock.say(
-        f"  {count_words(len(left), 'member')} left out, which cost more: {names}"
-    )
+def _without(
+    family: PreparedFamily, places: frozenset[int], why: str, clock: Stopwatch
+) -> PreparedFamily:
+    left = [family.asked.names[family.served[place]] for place in sorted(places)]
+    members = count_words(len(left), "member")
+    clock.say(f"  {members} left out, {why}: {', '.join(left)}")
+    return family.without(sorted(places))
 
 
 def _larger(

@@ -1,4 +1,4 @@
-"""Members that a rig needn't serve: as many as may be, of those that cost devices.
+"""Members that a rig needn't serve: whom none could, then those that cost devices.
 
 With one device fewer the cover that lacks least of all quotas leaves some members
 short. Where they are few enough, the rest takes fewer devices; and so on.
@@ -6,7 +6,22 @@ short. Where they are few enough, the rest takes fewer devices; and so on.
 
 import numpy as np
 
+from planning.projectors.candidate_set import CandidateSet
 from planning.proofs.selection import CandidateCover
+
+
+def unreachable_members(
+    candidates: CandidateSet, n_members: int, allowed: int
+) -> frozenset[int]:
+    """Return the members of which no candidates light as much as must be reachable.
+
+    None, where they are more than may be left out.
+    """
+    member, least = candidates.samples.member, candidates.scene.requirements
+    n = np.bincount(member, minlength=n_members)
+    reached = np.bincount(member[candidates.reached], minlength=n_members)
+    dark = np.flatnonzero(reached < least.min_reachable * n)
+    return frozenset(dark.tolist() if len(dark) <= allowed else ())
 
 
 def costly_members(cover: CandidateCover, needed: int, allowed: int) -> frozenset[int]:

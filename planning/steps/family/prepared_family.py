@@ -31,6 +31,11 @@ class PreparedFamily:
         assert self.request.family is not None
         return self.request.family
 
+    @property
+    def spare(self) -> int:
+        """Members served that needn't be."""
+        return len(self.served) - self.asked.n_asked
+
     @cached_property
     def ready(self) -> Prepared:
         """Those served as one: regions and curvature are said of each member alone."""

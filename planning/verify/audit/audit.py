@@ -198,7 +198,7 @@ def audited(
     everywhere = None
     if over_poses is not None:
         everywhere = audit_pose_proofs(case, findings, over_poses)
-    unmet = _unmet_requirements(plan)
+    unmet = unmet_requirements(plan)
     return Audit(findings.failures, unmet, case, derived, everywhere)
 
 
@@ -218,7 +218,7 @@ def first_false(case: AuditCase, *, quick: bool = False) -> tuple[str, ...]:
     return ()
 
 
-def _unmet_requirements(plan: RigPlan) -> tuple[str, ...]:
+def unmet_requirements(plan: RigPlan) -> tuple[str, ...]:
     """Return one sentence for each requirement on the target that isn't met.
 
     lit >= dominant_coverage x reachable by projectors, measured >= coverage x reachable

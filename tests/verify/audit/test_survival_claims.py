@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planning.verify.audit.audit import _unmet_requirements
+from planning.verify.audit.audit import unmet_requirements
 from planning.verify.audit.audit_case import examine
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.coverage.survival_claims import audit_survival
@@ -176,6 +176,6 @@ def test_numbers_of_devices_that_are_lies_are_told(told, handmade, key, lie):
 
 
 def test_what_isnt_met_after_a_loss_is_told(told):
-    unmet = " ".join(_unmet_requirements(told[0]))
+    unmet = " ".join(unmet_requirements(told[0]))
     assert "requirements.dominant_coverage without P1" in unmet
     assert "requirements.coverage without C1" in unmet
