@@ -10,7 +10,7 @@ import numpy as np
 from geometry.parallel import n_threads
 from planning.model.plan import RigPlan
 from planning.model.words import labelled, percent
-from planning.report.page.page import PAGE, is_page, write_page
+from planning.report.page.page import PAGE, is_page, pages_of, write_page
 from planning.report.summary.sections import SECTIONS
 from planning.verify.audit.devices.camera_figures import (
     CameraFigures,
@@ -85,22 +85,29 @@ def compare_command(options: Mapping[str, Any]) -> int:
 
 
 def report_command(options: Mapping[str, Any]) -> int:
-    """Write a plan's page; what isn't a page stays, unless `-o` names it.
+    """Write a plan's page, and those of a family's members; `-o` names a page alone.
+
+    What isn't a page stays, unless `-o` names it.
 
     Raises:
-        OSError: If it can't be written.
+        OSError: If one can't be written.
     """
-    plan = RigPlan.load(options["plan_file"])
-    path = options["output"] or options["plan_file"].parent / PAGE
-    if options["output"] is None and path.exists() and not is_page(path):
-        raise FileExistsError(f"{path} isn't of a plan; choose another with -o")
-    if not path.parent.is_dir():
-        raise FileNotFoundError(f"{path.parent} is no folder; make it first")
-    write_page(plan, path, threads=options["threads"] or n_threads())
+    plan, alone = RigPlan.load(options["plan_file"]), options["output"]
+    pages = pages_of(plan, options["plan_file"].parent / PAGE)
+    if alone is not None:
+        pages = {alone: plan}
+    for path in pages:
+        if alone is None and path.exists() and not is_page(path):
+            raise FileExistsError(f"{path} isn't of a plan; choose another with -o")
+        if not path.parent.is_dir():
+            raise FileNotFoundError(f"{path.parent} is no folder; make it first")
+    for path, shown in pages.items():
+        threads = options["threads"] or n_threads()
+        write_page(shown, path, threads=threads, linked=alone is None)
     if options["as_json"]:
-        print_json({"files": [str(path)]})
+        print_json({"files": [str(path) for path in pages]})
     else:
-        click.echo(f"written to {path}")
+        click.echo("\n".join(f"written to {path}" for path in pages))
     return 0
 
 

@@ -470,6 +470,24 @@ def test_a_folder_and_a_pattern_name_the_same_members(few, folder):
     assert "2 cameras; over candidates at least 2" in shown.stdout
 
 
+def test_a_report_links_members_pages_where_they_are(both, tmp_path):
+    both.save(tmp_path / "plan.json")
+    link = 'href="members/member-2/report.html"'
+    elsewhere = tmp_path / "elsewhere.html"
+    assert run("report", tmp_path, "-o", elsewhere).exit_code == 0
+    assert link not in elsewhere.read_text()
+    assert not list(tmp_path.glob("members/*/report.html"))
+    ended = run("report", tmp_path, "--json")
+    names = ["report.html", *(f"members/member-{m}/report.html" for m in (1, 2))]
+    assert json.loads(ended.stdout)["files"] == [str(tmp_path / name) for name in names]
+    assert link in (tmp_path / names[0]).read_text()
+    assert "Members</caption>" not in (tmp_path / names[2]).read_text()
+    mine = tmp_path / names[1]
+    mine.write_text("mine")
+    assert run("report", tmp_path).exit_code == 2
+    assert mine.read_text() == "mine"
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [

@@ -157,7 +157,8 @@ def compare(**options: Any) -> None:  # noqa: ANN401
     "--output",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Where it goes [default: report.html beside the plan].",
+    help="Where it goes, by itself [default: report.html beside the plan, and beside "
+    "each member's].",
 )
 @threads_option
 @output_options

@@ -11,7 +11,13 @@ from planning.model.progress import TIME_IS_UP, Report, Stopwatch, untimed
 from planning.report.drawing.face_colours import face_status
 from planning.report.drawing.picture_view import save_picture
 from planning.report.drawing.rig_picture import draw_rig
-from planning.report.page.page import PAGE, error_by_face, is_page, write_page
+from planning.report.page.page import (
+    PAGE,
+    error_by_face,
+    is_page,
+    pages_of,
+    write_page,
+)
 from planning.verify.reconstruction.pattern_files import write_patterns
 from planning.verify.reconstruction.scanner import Scanner
 from planning.verify.verdict import Verification
@@ -58,10 +64,7 @@ class SavedPlans:
     def write_page(self, plan: RigPlan, clock: Stopwatch, threads: int) -> None:
         """Write `report.html` beside a plan that stands, where there is time for it."""
         self._report("report")
-        pages = {self._folder / PAGE: plan}
-        for record, member in zip(plan.document.members, plan.members, strict=False):
-            pages[(self._folder / record.path).with_name(PAGE)] = member
-        for path, shown in pages.items():
+        for path, shown in pages_of(plan, self._folder / PAGE).items():
             if path.exists() and not is_page(path):
                 self._report(
                     f"{path} isn't of a plan and stays; `plan report -o` writes"
@@ -70,7 +73,9 @@ class SavedPlans:
             try:
                 with clock.ticking():
                     error_m = self._errors.get(shown.digest)
-                    write_page(shown, path, threads=threads, error_m=error_m)
+                    write_page(
+                        shown, path, threads=threads, error_m=error_m, linked=True
+                    )
             except TIME_IS_UP:
                 folder = path.parent
                 self._report(f"no time for {path}: `plan report {folder}` writes it")

@@ -1,4 +1,4 @@
-"""The members of a family in a table, each with a link to its own page."""
+"""The members of a family in a table, which may link their own pages."""
 
 from html import escape
 from pathlib import PurePosixPath
@@ -10,13 +10,16 @@ from planning.report.summary.family_lines import (
     family_rows,
 )
 
-from .markup import element, linked, paragraphs, table
+from .markup import element, paragraphs, table, with_link
 
 _PAGE = "report.html"
 
 
-def family_table(plan: RigPlan) -> str:
-    """Return the table and what bounds the rig; nothing of a plan for one mesh."""
+def family_table(plan: RigPlan, *, linked: bool) -> str:
+    """Return the table and what bounds the rig; nothing of a plan for one mesh.
+
+    `linked` says whether members' own pages are below the folder of this one.
+    """
     rows = list(family_rows(plan))
     if not rows:
         return ""
@@ -26,8 +29,8 @@ def family_table(plan: RigPlan) -> str:
         f"is of {shown.removesuffix(' (worst)')}."
     )
     whole = table("Members", family_heads(), [row.cells for row in rows], note)
-    for row in rows:
+    for row in rows if linked else ():
         page = str(PurePosixPath(row.path).with_name(_PAGE))
-        whole = linked(whole, row.cells[0], page)
+        whole = with_link(whole, row.cells[0], page)
     bounds = paragraphs(family_bounds(plan))
     return element("h2", escape("Family")) + whole + bounds

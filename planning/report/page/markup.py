@@ -51,7 +51,7 @@ def table(
     return element("div", scrolled + below, class_="entry")
 
 
-def linked(markup: str, heading: str, address: str) -> str:
+def with_link(markup: str, heading: str, address: str) -> str:
     """Return a table with the heading of a row as a link."""
     plain = element("th", escape(heading), scope="row")
     link = element("a", escape(heading), href=address)

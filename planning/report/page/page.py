@@ -31,8 +31,21 @@ _NO_CLOUD = (
 )
 
 
+def pages_of(plan: RigPlan, path: Path) -> dict[Path, RigPlan]:
+    """Return what is shown where: the plan, and a family's members below its folder."""
+    pages = {path: plan}
+    for record, member in zip(plan.document.members, plan.members, strict=False):
+        pages[(path.parent / record.path).with_name(PAGE)] = member
+    return pages
+
+
 def write_page(
-    plan: RigPlan, path: Path, *, threads: int, error_m: Array | None = None
+    plan: RigPlan,
+    path: Path,
+    *,
+    threads: int,
+    error_m: Array | None = None,
+    linked: bool = False,
 ) -> None:
     """Write the report of a plan; an old file stays whole until it is complete.
 
@@ -41,11 +54,14 @@ def write_page(
         path: Where it goes.
         threads: Worker threads; the file doesn't depend on it.
         error_m: What `error_by_face` returned; None: no check was made in this run.
+        linked: Whether members' own pages are linked, which `pages_of` tells the places
+            of; a page by itself has none to link.
 
     Raises:
         OSError: If it can't be written.
     """
-    content = page_of(plan, threads=threads, error_m=error_m).encode()
+    page = page_of(plan, threads=threads, error_m=error_m, linked=linked)
+    content = page.encode()
     write_atomically(path, lambda file: file.write(content))
 
 
@@ -70,7 +86,13 @@ def is_page(path: Path) -> bool:
         return _GENERATOR in file.read(4096)
 
 
-def page_of(plan: RigPlan, *, threads: int, error_m: Array | None = None) -> str:
+def page_of(
+    plan: RigPlan,
+    *,
+    threads: int,
+    error_m: Array | None = None,
+    linked: bool = False,
+) -> str:
     """Return the page; arguments as of `write_page`."""
     samples = centroids(plan)
     facts = per_face(plan, samples, threads=threads)
@@ -78,7 +100,7 @@ def page_of(plan: RigPlan, *, threads: int, error_m: Array | None = None) -> str
     style, script = _resource("page.css"), _resource("viewer.js")
     mesh = plan.document.own_mesh.path
     title = f"Rig plan for {PurePath(mesh).name if mesh else 'a surface'}"
-    document = plan.document
+    document, members = plan.document, family_table(plan, linked=linked)
     footer = (
         f"Plan {plan.digest[:16]}, made {document.created} from {mesh} by "
         f"ringrig. Viewer: three.js (MIT licence, copyright three.js authors)."
@@ -91,7 +113,7 @@ def page_of(plan: RigPlan, *, threads: int, error_m: Array | None = None) -> str
         style=style,
         verdict=verdict(plan),
         remark=escape(_NO_CLOUD) if error_m is None else "",
-        tables="".join((family_table(plan), *device_tables(plan), *claim_tables(plan))),
+        tables="".join((members, *device_tables(plan), *claim_tables(plan))),
         summary=escape(summary(plan, (), shortfalls(plan))),
         wall=wall_sheet(plan),
         footer=escape(footer),
