@@ -7,7 +7,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from planning.model.files import write_atomically
-from planning.report.page.markup import element, linked, table
+from planning.report.page.markup import element, table, with_link
 from planning.report.page.page import PAGE
 
 from .ledger import Row
@@ -35,7 +35,7 @@ def _page(rows: Sequence[Row], out: Path) -> str:
     whole = table("Parts", _HEADS, cells, _NOTE)
     for row in ordered:
         if _stands(row, out, PAGE):
-            whole = linked(whole, row.part, f"{row.folder}/{PAGE}")
+            whole = with_link(whole, row.part, f"{row.folder}/{PAGE}")
     met, missed = (sum(row.exit == code for row in rows) for code in (0, 1))
     failed = len(rows) - met - missed
     words = f"{met} of {len(rows)} parts are measured as asked"
