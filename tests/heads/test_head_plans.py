@@ -7,6 +7,7 @@ import pytest
 from support.group_rigs import head_rig, planned
 
 from geometry.shapes.boxes import box_gap
+from planning.cameras.stations.heads.fewest_heads import fewest_heads
 from planning.model.devices.planned import meet
 from planning.model.errors import InputError, PlanFileError
 from planning.report.page.per_face import centroids, per_face
@@ -59,6 +60,22 @@ def test_count_and_bounds_are_told_and_what_is_asked_is_measured(plan):
     assert 1 <= count.everywhere <= count.count
     assert target.measured_m2 >= 0.95 * target.reachable_by_cameras_m2
     assert target.lit_m2 >= 0.9 * target.reachable_by_projectors_m2
+
+
+def test_no_more_are_needed_than_meet_all_that_is_asked(few, monkeypatch):
+    """Candidates alone would take two more; those planned were moved."""
+
+    def pessimist(*args):
+        found = fewest_heads(*args)
+        n = len(found.chosen)
+        return replace(found, needed=n + 2, lower_bound=n + 1)
+
+    monkeypatch.setattr("planning.steps.stations.heads.fewest_heads", pessimist)
+    plan = planned(head_rig(head={"body": _BODY}), max_heads=9)
+    count = plan.document.stations.count
+    assert count.needed == count.lower_bound == count.count
+    assert "suffice" not in fewest_words(plan)
+    assert audit_plan(plan, n_samples=2000).failures == ()
 
 
 def test_housings_keep_apart(plan):

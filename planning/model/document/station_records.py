@@ -37,8 +37,8 @@ class StationCount(Part):
         lower_bound: Proven least number over the candidates.
         n_candidates: Of which they are chosen.
         n_samples: Frozen samples behind both.
-        lit: Of these must be lit, `measured` likewise.
-        measured: Must be measured.
+        lit: Of these must be lit, at least.
+        measured: Must be measured, at least: the more is lit, the more must be.
         proof: What proves the bound.
         everywhere: Least number over every pose of the workspace; None: not looked for.
         greedy: As many a greedy choice of the same candidates takes.

@@ -53,13 +53,16 @@ def heads_sought(request: PlanRequest, clock: Stopwatch) -> Search[PartialPlan, 
     while True:
         draft = yield partial, True
         assert draft is not None
-        if not any(short_of(draft)) or len(found.chosen) >= most:
+        short, count = any(short_of(draft)), _count(found, everywhere)
+        if not short and (count.needed is None or count.needed > count.count):
+            yield partial.told(count=_confirmed(count)), True
+        if not short or len(found.chosen) >= most:
             return
         more = found.with_one_more(source)
         if more is None:
             return
-        found, count = more, len(more.chosen)
-        clock.say(f"  fresh samples fall short: {count_words(count, 'head')}")
+        found, asked = more, count_words(len(more.chosen), "head")
+        clock.say(f"  fresh samples fall short: {asked}")
         partial = _placed(ready, source, found, everywhere, clock)
 
 
@@ -141,6 +144,12 @@ def _count(found: FoundHeads, everywhere: int | None) -> StationCount:
         everywhere=everywhere,
         greedy=found.greedy,
     )
+
+
+def _confirmed(count: StationCount) -> StationCount:
+    """The count of heads that were moved until fresh samples meet all that is asked."""
+    n = count.count
+    return count.changed(needed=n, lower_bound=min(count.lower_bound, n))
 
 
 def _in_order(

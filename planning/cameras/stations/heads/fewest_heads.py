@@ -8,7 +8,7 @@ import numpy as np
 
 from geometry.arrays import Ints, Mask
 from planning.scene.draws import DRAWS
-from solvers import CoverSolution, solve_cover, solve_max_coverage
+from solvers import CoverSolution, solve_max_coverage
 
 from .head_cover import HeadCover, HeadSets
 from .head_poses import HeadSource, PlacedHead
@@ -57,7 +57,7 @@ class FoundHeads:
         """
         count, seed = len(self.chosen) + 1, source.scene.seed
         more = solve_max_coverage(
-            *(self.cover.problem, count),
+            *(self.cover.whole.problem, count),
             warm_start=self.chosen,
             seed=seed,
             budget=_BUDGET,
@@ -130,8 +130,8 @@ def _with_better(
     And which of them are the fewest that were found so, none if none were.
     """
     cover, known = HeadCover.of(source.scene, sets), np.empty(0, dtype=np.int64)
-    solution = solve_cover(cover.problem, seed=source.scene.seed, budget=_BUDGET)
-    for count in range(len(solution.selected) - 1, max(least, 1) - 1, -1):
+    chosen, _ = cover.fewest(seed=source.scene.seed, budget=_BUDGET)
+    for count in range(len(chosen) - 1, max(least, 1) - 1, -1):
         moved = _moved_together(source, heads, cover, n, count)
         if moved is None:
             break
@@ -155,15 +155,14 @@ def _fewest_of(
     finds.
     """
     cover, seed = HeadCover.of(source.scene, sets), source.scene.seed
-    solution = solve_cover(cover.problem, seed=seed, budget=_PROOF_BUDGET)
-    chosen = solution.selected
+    chosen, solution = cover.fewest(seed=seed, budget=_PROOF_BUDGET)
     if len(known) and len(known) < len(chosen) and not cover.lacking(known):
         chosen = known
     if source.colliding([heads[k] for k in chosen]) is not None:
         chosen = _fewest_apart(source, heads, cover, chosen)
     needed = None if cover.lacking(chosen) else len(chosen)
     if needed is None or needed > most:
-        few = solve_max_coverage(cover.problem, most, seed=seed, budget=_BUDGET)
+        few = solve_max_coverage(cover.whole.problem, most, seed=seed, budget=_BUDGET)
         chosen = few.selected
         if source.colliding([heads[k] for k in chosen]) is not None:
             chosen = _apart(source, heads, cover, most)
@@ -186,10 +185,10 @@ def _fewest_apart(
             return chosen
         worse = min((int(chosen[k]) for k in pair), key=lambda k: (measured[k], k))
         left = left.without(worse)
-        solution = solve_cover(left.problem, seed=source.scene.seed, budget=_BUDGET)
-        if left.lacking(solution.selected):
+        others, _ = left.fewest(seed=source.scene.seed, budget=_BUDGET)
+        if left.lacking(others):
             break
-        chosen = solution.selected
+        chosen = others
     return _apart(source, heads, cover, len(heads))
 
 
@@ -224,7 +223,8 @@ def _moved_together(
     One after the other takes the pose around it with which least is lacking.
     """
     scene = source.scene
-    few = solve_max_coverage(cover.problem, count, seed=scene.seed, budget=_BUDGET)
+    whole = cover.whole.problem
+    few = solve_max_coverage(whole, count, seed=scene.seed, budget=_BUDGET)
     heads = [every[k] for k in few.selected]
     sets = cover.sets.take(few.selected)
     everywhere = replace(cover, sets=sets)
@@ -252,15 +252,8 @@ def _moved_together(
 def _lacking_with_each(cover: HeadCover, others: HeadSets, offered: HeadSets) -> Ints:
     """Return how many rows are lacking of other heads and each one offered, (k,)."""
     n, covers = others.lit.shape[1], replace(cover, sets=others.beside(offered)).covers
-    rows, floors = cover.quotas.regions.row, cover.quotas.floors
     served = np.any(covers[:, :n], axis=1, keepdims=True) | covers[:, n:]
-    counts = np.stack(
-        [
-            np.bincount(rows, weights=column, minlength=len(floors))
-            for column in served.T
-        ]
-    )
-    return np.clip(floors - counts, 0, None).sum(axis=1).astype(np.int64)
+    return np.array([cover.short(column).sum() for column in served.T], dtype=np.int64)
 
 
 def _greedy(
@@ -273,15 +266,18 @@ def _greedy(
 
     `clear` says of a head that is taken which others may be taken yet.
     """
-    rows, floors = cover.quotas.regions.row, cover.quotas.floors.astype(np.int64)
+    rows = cover.quotas.regions.row
     covers, chosen = cover.covers, begin.tolist()
-    served, free = covers[:, begin].any(axis=1), np.ones(covers.shape[1], dtype=bool)
+    served, free = (
+        np.any(covers[:, begin], axis=1),
+        np.ones(covers.shape[1], dtype=bool),
+    )
     if clear is not None:
         for taken in chosen:
             free = clear(taken)
     while True:
-        short = floors - np.bincount(rows[served], minlength=len(floors))
-        met = not (short > 0).any()
+        short = cover.short(served)
+        met = not short.any()
         wanted = ~served & (short > 0)[rows]
         gains = np.where(free, covers[wanted].sum(axis=0), 0)
         if met or len(chosen) == most or not gains.any():

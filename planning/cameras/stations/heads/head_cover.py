@@ -3,19 +3,27 @@
 Each measures by itself, with pairs of its own devices. Of n samples that candidates
 light n_L and measure n_M; the fewest heads are sought that together::
 
-    light >= ceil(dominant_coverage n_L)   and   measure >= ceil(coverage n_M)
+    light >= ceil(dominant_coverage n_L)   and   measure >= ceil(coverage n_R)
 
-and so of every large region, with its floor. A sample stands in a row for each of these
-that it counts for, so all of it is one cover.
+with n_R the samples that they light and any candidate measures, and so of every large
+region, with its floor. That isn't a cover, since n_R grows with what they light. But of
+those lit n_L - n_M at most can't be measured, so that all heads that are enough::
+
+    measure >= ceil(coverage (ceil(dominant_coverage n_L) - (n_L - n_M)))
+
+A sample stands in a row for each of these that it counts for, so that with these least
+floors all of it is one cover, whose bound holds. Its floors are raised to what the
+light of its heads asks for, until heads meet it.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 
-from geometry.arrays import Ints, Mask
+from geometry.arrays import Array, Ints, Mask
 from planning.proofs.quotas import Quotas, RegionFloors
 from planning.proofs.selection import cover_problem
 from planning.scene.lighting import lit_stages
@@ -26,6 +34,11 @@ from planning.scene.scene import Scene
 from solvers import CoverProblem, CoverSolution, solve_cover
 
 from .head_poses import PlacedHead
+
+# Times that floors are raised to what is due, before they are to what can be at most.
+_RAISES = 8
+# Counted work of each cover with raised floors, of which no proof is asked.
+_RAISED_BUDGET = 5e7
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,41 +109,46 @@ class HeadCover:
         sets: What the heads do.
         rows: Which sample each row is, shape (m,).
         of_light: Whether a row is of light, else of what is measured, shape (m,).
-        quotas: Which row counts for what, and how many of these are asked for.
+        quotas: Which row counts for what, and how many of these are asked for at least.
+        due: Of a row of light the number under which its sample counts as measured, 0
+            where no head measures it, shape (m,).
+        shares: What must be measured of that which is due under a number, (n_numbers,).
     """
 
     sets: HeadSets
     rows: Ints
     of_light: Mask
     quotas: Quotas
+    due: Ints
+    shares: Array
 
     @classmethod
     def of(cls, scene: Scene, sets: HeadSets) -> "HeadCover":
         """Return the cover that a scene's requirements ask for."""
         required, regions = scene.requirements, RegionFloors.of(scene, sets.target)
-        rows: list[Ints] = []
-        light: list[Mask] = []
-        number: list[Ints] = []
-        floors = [0]
-        for done, share in (
-            (sets.lit, required.dominant_coverage),
-            (sets.measured, required.coverage),
-        ):
-            reached = done.any(axis=1)
-            groups = [np.flatnonzero(reached)]
-            groups += [
-                np.flatnonzero(reached & (regions.row == r))
-                for r in range(1, regions.n_rows)
-            ]
-            shares = [share, *[regions.share] * (len(groups) - 1)]
-            for group, least in zip(groups, shares, strict=True):
-                number.append(np.full(len(group), len(floors), dtype=np.int64))
-                rows.append(group)
-                light.append(np.full(len(group), done is sets.lit))
-                floors.append(int(np.ceil(least * len(group) - 1e-9)))
-        numbers = RegionFloors(np.concatenate(number), len(floors))
-        quotas = Quotas(sum(floors), numbers, np.array(floors))
-        return cls(sets, np.concatenate(rows), np.concatenate(light), quotas)
+        lit, measured = np.any(sets.lit, axis=1), np.any(sets.measured, axis=1)
+        groups = [np.ones(len(lit), dtype=bool)]
+        groups += [regions.row == r for r in range(1, regions.n_rows)]
+        n = len(groups)
+        pairs = product((lit, measured), groups)
+        rows = [np.flatnonzero(done & one) for done, one in pairs]
+        counts = np.array([len(one) for one in rows])
+        shares = np.full((2, n), regions.share)
+        shares[:, 0] = required.dominant_coverage, required.coverage
+        least_lit = np.ceil(shares[0] * counts[:n] - 1e-9)
+        least_due = np.clip(least_lit - (counts[:n] - counts[n:]), 0, None)
+        least = np.ceil(shares[1] * least_due - 1e-9)
+        floors = np.concatenate([[0], least_lit, least]).astype(np.int64)
+        every, number = np.concatenate(rows), np.repeat(np.arange(2 * n) + 1, counts)
+        of_light = number <= n
+        return cls(
+            sets,
+            every,
+            of_light,
+            Quotas(int(floors.sum()), RegionFloors(number, len(floors)), floors),
+            np.where(of_light & measured[every], number + n, 0),
+            np.concatenate([np.zeros(1 + n), shares[1]]),
+        )
 
     def without(self, head: int) -> "HeadCover":
         """Return the same cover with a head that does nothing; the rows stay."""
@@ -172,6 +190,56 @@ class HeadCover:
         best = max((solution, *parts), key=lambda each: each.lower_bound)
         return int(np.ceil(best.lower_bound - 1e-9)), best.proof
 
+    def fewest(self, *, seed: int, budget: float) -> tuple[Ints, CoverSolution]:
+        """Return the fewest heads found that are enough, and the least floors' cover.
+
+        The bound is of that; where heads aren't enough, they are the nearest found.
+        """
+        first = solve_cover(self.problem, seed=seed, budget=budget)
+        chosen, cover = first.selected, self
+        for left in range(_RAISES, -1, -1):
+            if not self.lacking(chosen):
+                break
+            cover = cover.raised(self.served(chosen)) if left else self.whole
+            solution = solve_cover(cover.problem, seed=seed, budget=_RAISED_BUDGET)
+            chosen = solution.selected
+        return chosen, first
+
+    def raised(self, served: Mask) -> "HeadCover":
+        """Return the cover that asks for all that is due where rows are served."""
+        floors = self.floors_with(served)
+        quotas = replace(self.quotas, total=int(floors.sum()), floors=floors)
+        return replace(self, quotas=quotas)
+
+    @property
+    def whole(self) -> "HeadCover":
+        """The cover that asks as if all were lit: that is enough, whatever is."""
+        return self.raised(np.ones(len(self.rows), dtype=bool))
+
+    def floors_with(self, served: Mask) -> Ints:
+        """Return how many are asked for under each number where rows (m,) are served.
+
+        The more is lit that can be measured, the more must be.
+        """
+        due = np.bincount(self.due[served], minlength=len(self.shares))
+        asked = np.ceil(self.shares * due - 1e-9).astype(np.int64)
+        return np.maximum(self.quotas.floors, asked)
+
+    def short(self, served: Mask) -> Ints:
+        """Return how many are lacking under each number where rows (m,) are served."""
+        return np.clip(self.floors_with(served) - self.counts(served), 0, None)
+
+    def counts(self, served: Mask) -> Ints:
+        """Return how many rows of each number are served."""
+        row, n = self.quotas.regions.row, len(self.quotas.floors)
+        return np.bincount(row[served], minlength=n).astype(np.int64)
+
+    def served(self, chosen: Ints) -> Mask:
+        """Return which rows some of the heads serve, shape (m,)."""
+        lit = np.any(self.sets.lit[:, chosen], axis=1)
+        measured = np.any(self.sets.measured[:, chosen], axis=1)
+        return np.where(self.of_light, lit[self.rows], measured[self.rows])
+
     @property
     def totals(self) -> tuple[int, int]:
         """Numbers of what is asked of all that is lit, and measured, of no region."""
@@ -179,16 +247,14 @@ class HeadCover:
 
     def lacking(self, chosen: Ints) -> int:
         """Return how many rows are lacking of all that is asked, at least 0."""
-        lit = np.any(self.sets.lit[:, chosen], axis=1)
-        measured = np.any(self.sets.measured[:, chosen], axis=1)
-        served = np.where(self.of_light, lit[self.rows], measured[self.rows])
-        counts = np.bincount(
-            self.quotas.regions.row[served], minlength=len(self.quotas.floors)
-        )
-        return int(np.clip(self.quotas.floors - counts, 0, None).sum())
+        return int(self.short(self.served(chosen)).sum())
+
+    def refuted(self, chosen: Ints) -> bool:
+        """Return whether these aren't enough, nor any that light and measure less."""
+        return bool(np.any(self.counts(self.served(chosen)) < self.quotas.floors))
 
     @property
     def asked(self) -> tuple[int, int]:
-        """How many samples must be lit, and measured, of all."""
+        """How many samples must be lit, and measured, of all, at least."""
         lit, measured = self.totals
         return int(self.quotas.floors[lit]), int(self.quotas.floors[measured])

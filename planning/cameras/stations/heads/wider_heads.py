@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from geometry.arrays import Array, Ints
+from geometry.arrays import Array, Ints, Mask
 from planning.projectors.pose_programs import part_of_the_way, view_program
 from planning.projectors.share_margin import margin_at_share
 from solvers.poses.pose_problem import PoseProgram, pose_margins
@@ -96,8 +96,10 @@ class _Heads:
             return False
         one = HeadSets.of(self.source.scene, [offered], self.sets.target)
         sets = self.sets.with_at(k, one)
-        spared = np.ceil((1.0 + _SPARE) * self.cover.quotas.floors).astype(np.int64)
-        if np.any(self._served(sets) < np.minimum(self._served(self.sets), spared)):
+        before, after = self._served(self.sets), self._served(sets)
+        spared = np.ceil((1.0 + _SPARE) * self.cover.floors_with(after))
+        least = np.minimum(self.cover.counts(before), spared)
+        if np.any(self.cover.counts(after) < least):
             return False
         level = self._level(self._facing(self.heads, self.sets))
         if self._level(self._facing(heads, sets)) < level:
@@ -105,13 +107,9 @@ class _Heads:
         self.heads, self.sets = heads, sets
         return True
 
-    def _served(self, sets: HeadSets) -> Ints:
-        """How many rows of each number that something is asked of are served."""
-        quotas = self.cover.quotas
-        served = replace(self.cover, sets=sets).covers.any(axis=1)
-        return np.bincount(
-            quotas.regions.row[served], minlength=len(quotas.floors)
-        ).astype(np.int64)
+    def _served(self, sets: HeadSets) -> Mask:
+        """Which rows heads serve, shape (m,)."""
+        return np.any(replace(self.cover, sets=sets).covers, axis=1)
 
     def _facing(self, heads: Sequence[PlacedHead], sets: HeadSets) -> Array:
         """How squarely each head measures each sample: the cosine, or -inf, (n, k)."""
@@ -124,7 +122,8 @@ class _Heads:
 
     def _level(self, facing: Array) -> float:
         """How squarely at least as many samples as are required are measured."""
-        return margin_at_share(facing, self.cover.asked[1])
+        due = self.cover.floors_with(self._served(self.sets))
+        return margin_at_share(facing, int(due[self.cover.totals[1]]))
 
     def _program(self, k: int) -> PoseProgram | None:
         """The pose program of one head; None: nothing is its."""

@@ -157,11 +157,13 @@ class StepSearch:
         Tried are those from one number up to another.
         """
         n, (begin, end) = 0, turn
-        asked, crowded = self.cover.asked[1], not self.room.is_empty
+        least, crowded = self.cover.asked[1], not self.room.is_empty
         for row in self._choices.angles(lamps, count, spent):
             n += 1
             spent.tried += n > begin
             near, bits = self._choices.measured(lamps, row)
+            # What is in the way of light leaves less to measure.
+            asked = least if crowded else self._choices.asked(lamps, row)
             for chosen in rows_together(bits, n_eyes, asked):
                 # What is in the way is looked at for each choice anew.
                 n += crowded

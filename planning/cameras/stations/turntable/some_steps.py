@@ -13,7 +13,6 @@ import numpy as np
 
 from geometry.arrays import Ints
 from planning.scene.scene import Scene
-from solvers import solve_cover
 
 from .sample_bits import held_by, joined, rows_of_most
 from .standing_steps import StandingSteps, Steps
@@ -72,7 +71,7 @@ class SomeSteps:
     ) -> Iterator[tuple[tuple[Place, ...], tuple[Place, ...], Ints]]:
         """Yield draws that are enough at all angles, if nothing is in the way."""
         rng = np.random.default_rng(self.scene.seed)
-        cosets, asked = self.choices.cosets, self.choices.cover.asked[1]
+        cosets = self.choices.cosets
         for _ in range(_DRAWS):
             lamps = kept[int(rng.integers(len(kept)))]
             angles = cosets[int(rng.integers(len(cosets)))]
@@ -81,6 +80,7 @@ class SomeSteps:
             if len(among) < n_eyes:
                 continue
             rows = among[rng.random((_AT_ONCE, len(among))).argsort(axis=1)[:, :n_eyes]]
+            asked = self.choices.asked(lamps, angles)
             good = rows[held_by(joined(bits, rows)) >= asked]
             if len(good):
                 yield lamps, tuple(near[k] for k in good[0]), angles
@@ -98,7 +98,7 @@ class SomeSteps:
             cover = replace(self.stand.cover, sets=sets.take(angles))
             if cover.lacking(np.arange(len(angles))):
                 continue
-            few = solve_cover(cover.problem, seed=self.scene.seed, budget=_BUDGET)
-            steps = self.stand.enough(lamps, eyes, angles[few.selected])
-            if steps is not None and len(few.selected) <= most:
+            few, _ = cover.fewest(seed=self.scene.seed, budget=_BUDGET)
+            steps = self.stand.enough(lamps, eyes, angles[few])
+            if steps is not None and len(few) <= most:
                 yield steps

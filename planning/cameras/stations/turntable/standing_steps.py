@@ -51,7 +51,7 @@ class StandingSteps:
         """Places in the room, if it holds them and floors of regions are met, too."""
         cover, n = self.cover, self.sets.lattice.n_places
         free = self.sets.steps_of(lamps, eyes, angles=angles)
-        if replace(cover, sets=free).lacking(np.arange(len(angles))):
+        if replace(cover, sets=free).refuted(np.arange(len(angles))):
             return None
         for by, sets in self.standing(lamps, eyes, angles):
             if replace(cover, sets=sets).lacking(angles):

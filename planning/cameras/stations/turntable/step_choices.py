@@ -11,7 +11,7 @@ from geometry.arrays import Ints
 from planning.cameras.stations.heads.head_cover import HeadCover
 
 from .circle import Circle
-from .sample_bits import Bits, held_by, joined, rows_together, subsets
+from .sample_bits import Bits, held_by, joined, packed, rows_together, subsets
 from .table_sets import Place, TableSets
 
 
@@ -116,6 +116,13 @@ class StepChoices:
         order = np.argsort(-np.concatenate(held), kind="stable")
         return np.concatenate(kept)[order]
 
+    def asked(self, lamps: tuple[Place, ...], angles: Ints) -> int:
+        """Return how much must be measured of what is lit, with nothing in the way."""
+        light = joined(self._bits(lamps)[0], angles[None])
+        number = self.cover.totals[1]
+        due = self.cover.shares[number] * int(held_by(light & self._measurable)[0])
+        return max(self.cover.asked[1], int(np.ceil(due - 1e-9)))
+
     def measured(
         self, lamps: tuple[Place, ...], angles: Ints
     ) -> tuple[list[Place], Bits]:
@@ -140,6 +147,11 @@ class StepChoices:
             )
         )
         return light, anyone
+
+    @cached_property
+    def _measurable(self) -> Bits:
+        """What any pair measures at any angle, (1, b)."""
+        return packed(self.sets.everywhere().measured)
 
     @cached_property
     def _circles(self) -> list[Circle]:
