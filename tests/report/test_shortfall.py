@@ -14,8 +14,9 @@ def plan(handmade):
     return handmade.build_plan()
 
 
-def missed(plan, *, blocked=None, **areas):
+def missed(plan, *, blocked=None, relaxations=(), **areas):
     document = plan.to_document()
+    document["coverage"]["relaxations"] = list(relaxations)
     if blocked is not None:
         document["coverage"]["blocked_by_body_m2"] = blocked
     target = document["coverage"]["target"]
@@ -57,6 +58,16 @@ def test_out_of_reach_says_how_much_why_and_what_helps(plan):
     for words in ("75.0 %", "20.0 % shadowed", "5.0 % met by the light", "2500.0 cm²"):
         assert words in line
     assert "--min-reachable 0.75" in line
+
+
+def test_what_reaches_what_is_asked_is_told_first(plan):
+    """Plan files list the least gain first, a summary shows two remedies at most."""
+    steps = [("A", 0.78), ("B", 0.85), ("C", 0.93)]
+    told = [{"change": c, "reachable_share": share} for c, share in steps]
+    (line,) = missed(plan, relaxations=told, reachable_by_projectors_m2=0.75)
+    changes = line.split("What would help: ")[1].split(" would reach")
+    assert [words[-1] for words in changes[:3]] == ["C", "B", "A"]
+    assert line.endswith("--min-reachable 0.75 accepts what there is")
 
 
 def test_one_projector_short_of_light_names_how_many_would_do(plan):

@@ -183,11 +183,12 @@ def _reachable(
 
 
 def _steps(relaxations: tuple[Relaxation, ...], share: float) -> tuple[str, ...]:
-    """What each relaxation would reach, and what accepts the share that is reached."""
+    """What each relaxation would reach, most first, and what accepts what there is."""
+    ranked = sorted(relaxations, key=lambda step: -step.reachable_share)
     return (
         *(
             f"{step.change} would reach {percent(step.reachable_share)}"
-            for step in relaxations
+            for step in ranked
         ),
         f"--min-reachable {rounded_down(share)} accepts what there is",
     )
