@@ -25,6 +25,7 @@ from planning.cameras.paper.paper_cameras import (
 from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.document.certificates import CamerasBy, RouteCounts
 from planning.model.errors import InfeasibleLimitsError
+from planning.model.words import percent
 from planning.proofs.selection import fewest_count
 from planning.scene.measuring.camera_views import CandidateViews
 from planning.scene.scene import Scene
@@ -233,13 +234,12 @@ def _compared(
 ) -> RouteCounts:
     """Say what either route needs, and why one of them is taken."""
     cover, kept, paper = before.selection.needed, after.selection.needed, route.needed
-    required = f"{100.0 * scene.requirements.coverage:g} % is asked"
+    asked = scene.requirements.coverage
+    required = f"{100.0 * asked:g} % is asked"
     taken, why = "cover", "as many, and the paper's don't stand clearly farther apart"
     if paper is None:
-        why = (
-            f"the paper's route ended with {_percent(route.reached)} of what is "
-            f"reachable, {required}"
-        )
+        share = percent(route.reached, asked=asked)
+        why = f"the paper's route ended with {share} of what is reachable, {required}"
     elif paper == kept < cover:
         why = "fewer; its cameras stand between the candidates and joined them"
         taken, kept = "paper", cover
@@ -249,8 +249,3 @@ def _compared(
     elif paper > kept:
         why = f"fewer; of the {paper} by the paper's route: {route.stopped}, {required}"
     return RouteCounts(asked="both", cover=kept, paper=paper, taken=taken, why=why)
-
-
-def _percent(share: float) -> str:
-    # Rounded down: what falls short must not look as if it were enough.
-    return f"{np.floor(1e3 * share) / 10.0:.1f} %"

@@ -1,5 +1,6 @@
 """Quantities as a person reads them."""
 
+import math
 from collections.abc import Sequence
 
 # Areas below this are told in mm² [m²].
@@ -18,8 +19,12 @@ def count_words(count: int, noun: str) -> str:
     return f"{count} {noun}{'s' * (count != 1)}"
 
 
-def percent(share: float, *, decimals: int = 1) -> str:
-    """Return a share in percent."""
+def percent(share: float, *, decimals: int = 1, asked: float = 0.0) -> str:
+    """Return a share in percent; one that misses what is asked is rounded down."""
+    if share < asked:
+        # What falls short must not look as if it were enough.
+        steps = 10.0 ** (decimals + 2)
+        share = math.floor(steps * share) / steps
     return f"{100.0 * share:.{decimals}f} %"
 
 

@@ -305,7 +305,7 @@ def _requirements():
 
 def test_changes_that_gain_less_than_a_point_are_left_out():
     share = Share(1000, 500, 0.9)
-    assert share.wanted == 400
+    assert share.wanted == 403
     gained = share.gains({"a": 400, "b": 9, "c": 10})
     told = [(entry.change, entry.reachable_share) for entry in gained]
     assert told == [("c", 0.51), ("a", 0.9)]
@@ -375,7 +375,10 @@ def test_one_camera_is_enough_at_what_is_told_and_not_below(rig, world):
 
 
 def test_a_limit_gives_way_as_far_as_the_share_asks_or_as_it_helps(rig, monkeypatch):
-    """Ten of twenty samples ask 1, 2, ... 10 degrees; two are measured as it is."""
+    """Ten of twenty samples ask 1, 2, ... 10 degrees; two are measured as it is.
+
+    The share is reached with 0.3 % to spare: 7.06 of the samples are 8.
+    """
     asked = np.full((1, 20), np.inf)
     asked[0, :10] = np.arange(1.0, 11.0) - 0.5
     asked[0, 18:] = -np.inf
@@ -387,7 +390,7 @@ def test_a_limit_gives_way_as_far_as_the_share_asks_or_as_it_helps(rig, monkeypa
     samples = SimpleNamespace(lit=None, target=range(20))
     table = least_demands(None, [None], samples, (knob,))
     asks = table.demanded[:, table.furthest < MEASURED]
-    for least, degrees, gained in ((0.35, 5, 5), (0.9, 10, 10), (0.1, None, None)):
+    for least, degrees, gained in ((0.35, 6, 6), (0.9, 10, 10), (0.05, None, None)):
         changes = least_changes((knob,), asks, Share(20, 2, least).wanted)
         want = {} if degrees is None else {knob.say(degrees): gained}
         assert changes == want

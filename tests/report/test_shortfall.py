@@ -4,7 +4,7 @@ import pytest
 
 from planning.model.document.check_records import ReconstructionRecord
 from planning.model.plan import RigPlan
-from planning.model.words import area_words
+from planning.model.words import area_words, percent
 from planning.report.summary.coverage_lines import area_cell
 from planning.report.summary.shortfall import shortfalls
 
@@ -79,7 +79,7 @@ def test_one_projector_short_of_light_names_how_many_would_do(plan):
 
 def test_cameras_that_miss_by_a_hair_offer_the_share_they_reach(plan):
     (line,) = missed(plan, measured_m2=0.9399)
-    assert line.startswith("3 cameras measure 94.0 %")
+    assert line.startswith("3 cameras measure 93.9 %")
     assert "--coverage 0.93 accepts this plan" in line
     assert "--max-cameras" not in line
 
@@ -93,6 +93,15 @@ def test_a_share_that_is_advised_is_one_that_the_option_takes(plan, measured, ac
     advised = line.split("--coverage ")[1].split(" ")[0]
     assert advised == accepted
     assert 0.0 < float(advised) <= measured
+
+
+def test_a_share_that_is_missed_is_rounded_down(plan):
+    """What falls short by less than the last digit doesn't look as if it passed."""
+    (line,) = missed(plan, lit_m2=0.89981)
+    assert line.startswith("1 projector lights 89.9 % ")
+    (line,) = missed(plan, reachable_by_projectors_m2=0.89981, lit_m2=0.89)
+    assert line.startswith("only 89.9 % of the target")
+    assert percent(0.89981, asked=0.89) == "90.0 %"
 
 
 def test_bodies_that_are_in_the_way_are_named(plan):

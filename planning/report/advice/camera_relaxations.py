@@ -32,6 +32,7 @@ from planning.scene.workspace.model_candidates import one_of_each
 
 from .demands import Demands, demands
 from .least_changes import (
+    SPARE,
     Share,
     enough,
     larger_workspaces,
@@ -39,9 +40,6 @@ from .least_changes import (
     least_enough,
     relaxations_of_cameras,
 )
-
-# What covers cover beyond the requirement, so that fresh samples confirm it.
-SPARE = 0.003
 
 
 def out_of_reach(

@@ -23,6 +23,8 @@ from solvers import solve_max_coverage
 
 ANYWHERE = "the whole shell as workspace"
 ANY_SETTING = "a mount of any roll, pan, tilt and place"
+# What is aimed at beyond the requirement, so that fresh samples confirm it.
+SPARE = 0.003
 # Less isn't worth telling.
 _GAIN = 0.01
 # Counted work of each cover, of which no proof is asked.
@@ -33,7 +35,10 @@ _SAME_M = 1e-6
 
 @dataclass(frozen=True)
 class Share:
-    """Of n samples so many are `reached` by some pose; a `least` share must be."""
+    """Of n samples so many are `reached` by some pose; a `least` share must be.
+
+    As much to spare is wanted as lets fresh samples confirm it.
+    """
 
     n: int
     reached: int
@@ -42,7 +47,8 @@ class Share:
     @property
     def wanted(self) -> int:
         """Samples to gain."""
-        return int(np.ceil(self.least * self.n - 1e-9)) - self.reached
+        aim = min(self.least + SPARE, 1.0)
+        return int(np.ceil(aim * self.n - 1e-9)) - self.reached
 
     def gains(self, gained: dict[str, int]) -> tuple[Relaxation, ...]:
         """Return the changes that gain at least a percentage point, least first."""

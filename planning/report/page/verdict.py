@@ -109,7 +109,7 @@ def _rows(plan: RigPlan) -> Iterator[tuple[str, str, str, str]]:
         yield (
             what,
             f"at least {percent(least)}",
-            percent(share),
+            percent(share, asked=least),
             _judged(share >= least),
         )
     if asked.region_coverage and (large := plan.large_regions):

@@ -144,8 +144,10 @@ def _devices(plan: RigPlan, room: int) -> list[str]:
 def _measured(plan: RigPlan) -> Iterator[Block]:
     areas, asked = plan.coverage.target, plan.requirements
     sigma, limit = plan.coverage.sigma, asked.triangulation.max_sigma_m
-    lit = _share(areas.lit_m2, areas.reachable_by_projectors_m2)
-    seen = _share(areas.measured_m2, areas.reachable_by_cameras_m2)
+    lit = _share(
+        areas.lit_m2, areas.reachable_by_projectors_m2, asked.dominant_coverage
+    )
+    seen = _share(areas.measured_m2, areas.reachable_by_cameras_m2, asked.coverage)
     first = f"lit {lit} ({100 * asked.dominant_coverage:g} asked) and measured"
     if plan.cameras_alone:
         first = f"by pairs, {asked.min_views} cameras or more seeing it, measured"
@@ -255,5 +257,5 @@ def _end(plan: RigPlan, files: Sequence[str]) -> Iterator[Block]:
     )
 
 
-def _share(part: float, whole: float) -> str:
-    return percent(part / whole) if whole > 0.0 else "none"
+def _share(part: float, whole: float, asked: float = 0.0) -> str:
+    return percent(part / whole, asked=asked) if whole > 0.0 else "none"

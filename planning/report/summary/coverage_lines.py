@@ -41,8 +41,13 @@ def coverage_lines(plan: RigPlan) -> list[str]:
     if chosen == "surface":
         # One surface: that it was sampled twice is no news.
         columns = {"whole surface": target}
-    lit = _ratio(target.lit_m2, target.reachable_by_projectors_m2)
-    measured = _ratio(target.measured_m2, target.reachable_by_cameras_m2)
+    required = plan.requirements
+    lit = _ratio(
+        *(target.lit_m2, target.reachable_by_projectors_m2), required.dominant_coverage
+    )
+    measured = _ratio(
+        *(target.measured_m2, target.reachable_by_cameras_m2), required.coverage
+    )
     table = [f"{'':<25}{''.join(f'{title:>24}' for title in columns)}"]
     for label, key in area_rows(plan).items():
         cells = (area_cell(getattr(a, key), a.area_m2) for a in columns.values())
@@ -199,8 +204,8 @@ def area_cell(area_m2: float, whole_m2: float) -> str:
     return f"{area:9.1f} {unit} {percent(area_m2 / whole_m2):>8}"
 
 
-def _ratio(part: float, whole: float) -> str:
-    return percent(part / whole) if whole > 0 else "undefined"
+def _ratio(part: float, whole: float, asked: float) -> str:
+    return percent(part / whole, asked=asked) if whole > 0 else "undefined"
 
 
 def marginal_lines(plan: RigPlan) -> list[str]:

@@ -185,16 +185,17 @@ def _shares(areas: RegionCoverage) -> tuple[float, float]:
 
 
 def _deed(plan: RigPlan, areas: RegionCoverage) -> str:
-    lit, measured = _shares(areas)
+    asked = plan.requirements.region_coverage
+    lit, measured = (percent(share, asked=asked) for share in _shares(areas))
     if plan.cameras_alone:
         if not areas.reachable_by_cameras_m2:
             return "out of reach of every pair of cameras"
-        return f"measured {percent(measured)} of what can be"
+        return f"measured {measured} of what can be"
     if not areas.reachable_by_projectors_m2:
         return "out of reach of every projector"
     if not areas.reachable_by_cameras_m2:
-        return f"lit {percent(lit)} of what can be and measured nowhere"
-    return f"lit {percent(lit)} and measured {percent(measured)} of what can be"
+        return f"lit {lit} of what can be and measured nowhere"
+    return f"lit {lit} and measured {measured} of what can be"
 
 
 def region_place(plan: RigPlan, region: RegionRecord) -> str:

@@ -107,10 +107,9 @@ def _surviving(plan: RigPlan) -> Iterator[Shortfall]:
             continue
         where = f"without {loss.lost}" if loss.lost else "with all devices there"
         by = f" by {pairs_words(asked.views)}" if asked.views > 1 else ""
-        figure = (
-            f"{where} lit {percent(lit_share(loss))} and measured{by} "
-            f"{percent(measured_share(loss))} of what can be"
-        )
+        lit = percent(lit_share(loss), asked=required.dominant_coverage)
+        measured = percent(measured_share(loss), asked=required.coverage)
+        figure = f"{where} lit {lit} and measured{by} {measured} of what can be"
         regions = ", ".join(map(str, loss.floors_missed))
         floors = f"; region {regions} falls below its floor" if regions else ""
         yield Shortfall(
@@ -169,25 +168,28 @@ def _reachable(
         if reached >= least * whole:
             continue
         share = reached / whole
+        reached_share = percent(share, asked=least)
         mount = requirements.workspace.mount_of(kind)
         stepped = mount is not None and mount.is_stepped
         yield Shortfall(
-            f"{percent(share)} of {what} can be {deed} at all, {percent(least)} asked",
-            f"only {percent(share)} of {what} can be {deed} from anywhere in the "
+            f"{reached_share} of {what} can be {deed} at all, {percent(least)} asked",
+            f"only {reached_share} of {what} can be {deed} from anywhere in the "
             f"workspace{' that mounts can be set to' * stepped}, {percent(least)} is "
             f"required (--min-reachable); "
             f"{area_words(whole - reached)} of {area_words(whole)} can't be{why}.",
-            _steps(relaxations, share),
+            _steps(relaxations, share, least),
             "; ",
         )
 
 
-def _steps(relaxations: tuple[Relaxation, ...], share: float) -> tuple[str, ...]:
+def _steps(
+    relaxations: tuple[Relaxation, ...], share: float, least: float
+) -> tuple[str, ...]:
     """What each relaxation would reach, most first, and what accepts what there is."""
     ranked = sorted(relaxations, key=lambda step: -step.reachable_share)
     return (
         *(
-            f"{step.change} would reach {percent(step.reachable_share)}"
+            f"{step.change} would reach {percent(step.reachable_share, asked=least)}"
             for step in ranked
         ),
         f"--min-reachable {rounded_down(share)} accepts what there is",
@@ -227,11 +229,12 @@ def _covered(document: PlanDocument, requirements: Requirements) -> Iterator[Sho
         share = covered / whole if whole > 0 else 0.0
         if proof is None or share >= required:
             continue
+        told = percent(share, asked=required)
         devices = kind if proof.count > 1 else kind.removesuffix("s")
         verb = deed if proof.count > 1 else deed.replace(" ", "s ", 1)
         yield Shortfall(
-            f"{percent(share)} {done}, {100 * required:g} % asked",
-            f"{proof.count} {devices} {verb.format(percent(share))}, "
+            f"{told} {done}, {100 * required:g} % asked",
+            f"{proof.count} {devices} {verb.format(told)}, "
             f"{percent(required)} is required; {area_words(whole - covered)} of "
             f"{area_words(whole)} are left{_bodies(document.coverage, proof)}."
             f"{_why(kind, document.coverage)}",
