@@ -24,7 +24,10 @@ from planning.model.errors import (
     RigError,
 )
 from planning.model.plan import RigPlan
+from planning.report.page.claim_tables import claim_tables
 from planning.report.summary.brief import brief
+from planning.report.summary.check_lines import cost_lines
+from planning.report.summary.devices.station_lines import station_lines, trade_lines
 from planning.scene.draws import DRAWS
 from planning.steps.prepare import prepared
 from planning.verify.audit.audit import audit_plan
@@ -235,8 +238,17 @@ def test_devices_stand_upright_whichever_way_the_part_turns(few):
 def test_turning_from_step_to_step_takes_its_time(plan):
     told = plan.document.stations
     assert told.move_s == 1.5 * (len(told.stations) - 1)
-    text = brief(plan, (), ())
-    assert f"{told.move_s:.1f} s to move between steps" in text
+    for text in (brief(plan, (), ()), "\n".join(cost_lines(plan.document))):
+        assert f"{told.move_s:.1f} s to move between steps" in text
+    page = "".join(claim_tables(plan))
+    row = page.split("moves between steps</th>")[1].split("</td>")[0]
+    assert row.endswith(f">{told.move_s:.1f} s")
+
+
+def test_a_bound_of_steps_is_called_that_and_not_a_proof(plan):
+    heading, *_ = trade_lines(plan.document.stations)
+    assert heading.split("  ")[-1] == "at least"
+    assert "proved" not in "\n".join(station_lines(plan))
 
 
 def test_the_audit_finds_every_claim_true(plan):

@@ -9,6 +9,7 @@ from planning.model.document.coverage_records import ProjectorMarginal
 from planning.model.plan import RigPlan
 from planning.model.words import area_words, percent
 from planning.report.summary.coverage_lines import area_rows
+from planning.report.summary.devices.station_lines import STATIONS
 from planning.report.summary.region_lines import region_place
 
 from .layers import CAUSE_WORDS
@@ -220,8 +221,11 @@ def _check(plan: RigPlan) -> str:
 
 
 def _cost(plan: RigPlan) -> str:
-    cost = plan.document.cost
+    cost, stations = plan.document.cost, plan.document.stations
     rows = [["frames of a scan", str(cost.n_frames)]]
+    if stations is not None and stations.move_s is not None:
+        between = f"moves between {STATIONS[stations.kind]}s"
+        rows += [[between, f"{stations.move_s:.1f} s"]]
     rows += [["pixels read", str(cost.pixels)]]
     for words, key in _COSTS.items():
         value = getattr(cost, key)

@@ -235,14 +235,14 @@ def _check(plan: RigPlan) -> Iterator[Block]:
 
 
 def _end(plan: RigPlan, files: Sequence[str]) -> Iterator[Block]:
-    cost = plan.document.cost
-    if cost.n_frames and not plan.document.evaluation:
+    document, cost = plan.document, plan.document.cost
+    if cost.n_frames and not document.evaluation:
         seconds = (
             "" if cost.frame_s is None else f", {cost.n_frames * cost.frame_s:.2f} s"
         )
         yield (
             "SCAN",
-            f"{count_words(cost.n_frames, 'frame')}{seconds}{moves_words(plan)}",
+            f"{count_words(cost.n_frames, 'frame')}{seconds}{moves_words(document)}",
             1,
         )
     if not files:

@@ -6,6 +6,8 @@ from planning.model.plan import RigPlan
 from planning.model.requirements import CheckLimits
 from planning.model.words import count_words, labelled, percent
 
+from .devices.station_lines import moves_words
+
 # Sums of seconds that differ by less are the same [s].
 _EXACT = 1e-6
 
@@ -72,13 +74,14 @@ def _agreement(check: ReconstructionRecord) -> list[str]:
 
 def cost_lines(document: PlanDocument) -> list[str]:
     """Return eq. (8) with its terms, for a person."""
-    cost = document.cost
+    cost, moves = document.cost, moves_words(document)
     if cost.frame_s is None:
-        scan = f"a scan is {count_words(cost.n_frames, 'frame')}"
+        scan = f"a scan is {count_words(cost.n_frames, 'frame')}{moves}"
         unknown = "frame_rate_hz of camera or projector isn't in the rig"
         return labelled("COST", [f"{scan}; {unknown}, so eq. (8) has no t1"])
     acquired = cost.n_frames * cost.frame_s
-    scan = f"{cost.n_frames} frames of {1e3 * cost.frame_s:.1f} ms, {acquired:.2f} s"
+    frames = f"{cost.n_frames} frames of {1e3 * cost.frame_s:.1f} ms"
+    scan = f"{frames}, {acquired:.2f} s{moves}"
     if cost.C is None or cost.t2 is None or cost.t3 is None:
         return labelled("COST", [f"a scan is {scan}"])
     lines = [

@@ -124,16 +124,16 @@ def _heads_or_stations(count: int) -> Iterator[str]:
 def _steps(rows: tuple[TradeRow, ...]) -> Iterator[str]:
     if not rows:
         return
-    yield "projectors  cameras  fewest steps  proved"
+    yield "projectors  cameras  fewest steps  at least"
     for row in rows:
         steps = "none" if row.steps is None else str(row.steps)
         devices = f"{row.projectors:>10}  {row.cameras:>7}"
-        yield f"{devices}  {steps:>12}  {row.lower_bound:>6}"
+        yield f"{devices}  {steps:>12}  {row.lower_bound:>8}"
 
 
-def moves_words(plan: RigPlan) -> str:
+def moves_words(document: PlanDocument) -> str:
     """Say what moves from one station to the next take; empty where it isn't known."""
-    told = plan.document.stations
+    told = document.stations
     if told is None or told.move_s is None:
         return ""
     return f", and {told.move_s:.1f} s to move between {STATIONS[told.kind]}s"
