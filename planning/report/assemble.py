@@ -121,8 +121,9 @@ class Draft:
         scene, regions = partial.scene, self.regions
         among = scene.among((*devices.projectors, *devices.cameras))
         coverage, certificates = claims.coverage, _certificates(partial)
-        if not partial.truncated and partial.stationed is None:
+        if not partial.truncated:
             coverage = with_relaxations(partial, devices, claims, clock)
+        if not partial.truncated and partial.stationed is None:
             regions = with_floor_relaxations(
                 regions, claims.region_samples, partial.request.rig, devices
             )

@@ -12,6 +12,7 @@ from planning.model.devices.planned import meet
 from planning.model.errors import InputError, PlanFileError
 from planning.report.page.per_face import centroids, per_face
 from planning.report.summary.devices.station_lines import fewest_words
+from planning.report.summary.shortfall import missing
 from planning.rig.rig import Rig
 from planning.scene.draws import DRAWS
 from planning.scene.placed_bodies import placed_box
@@ -205,6 +206,31 @@ def test_too_few_heads_measure_what_they_can_and_say_how_many_would(few):
     assert (len(short.projectors), len(short.cameras)) == (1, 2)
     assert count.needed > 1
     assert count.lower_bound > 1
+
+
+def test_heads_that_reach_too_little_say_which_limit_would_give_more(few):
+    """Pixels are 0.5 mm apart at 600 mm, more where the light meets at an angle."""
+    limits = {"max_sigma_mm": 1.0, "max_sample_distance_mm": 0.52}
+    place = {"standoff_mm": 600.0, "standoff_play_mm": 1.0}
+    short = planned(head_rig(limits=limits, placement=place), max_heads=2)
+    reach = next(one for one in missing(short) if "can be lit at all" in one.figure)
+    assert reach.helps[0].startswith("limits.max_sample_distance_mm = ")
+    shares = [one.reachable_share for one in short.coverage.relaxations]
+    assert max(shares) >= 0.9
+    assert not any("whole shell" in text for text in reach.helps)
+
+
+def test_of_cameras_of_heads_it_is_said_that_no_advice_is_computed(plan, handmade):
+    def unmeasurable(document):
+        target = document["coverage"]["target"]
+        target["reachable_by_cameras_m2"] = 0.5 * target["lit_m2"]
+
+    (reach,) = (
+        one
+        for one in missing(handmade.tampered(plan, unmeasurable))
+        if "can be measured at all" in one.figure
+    )
+    assert "what limit would help, isn't computed of heads and turntables" in str(reach)
 
 
 @pytest.mark.long

@@ -41,12 +41,13 @@ _OFFERED = 150
 
 
 def reachability_relaxations(
-    scene: Scene, reference: Sequence[PlannedProjector]
+    scene: Scene, reference: Sequence[PlannedProjector], *, elsewhere: bool = True
 ) -> tuple[Relaxation, ...]:
     """Return the share of the target that each single relaxation would make reachable.
 
     The smallest gain first. A limit gives way as far as `min_reachable` needs, or else
-    as far as it helps.
+    as far as it helps. Unless projectors may stand `elsewhere` alone, as those of heads
+    can't, no larger workspace is looked at.
     """
     target = scene.target_samples(DRAWS.relaxations)
     dark = target.take(furthest_lit(scene, reference, target) < LIT)
@@ -56,7 +57,8 @@ def reachability_relaxations(
     for moved, rest in scene.less_one_obstacle():
         furthest = furthest_lit(rest, reference, dark)
         gained[f"{moved} out of the way"] = int((furthest == LIT).sum())
-    for change, larger in larger_workspaces(workspace, "projector"):
+    larger_ones = larger_workspaces(workspace, "projector")
+    for change, larger in larger_ones if elsewhere else ():
         there = scene.candidates(one_of_each(reference), larger)
         tiled = workspace.projector_standoff_m is not None
         anywhere = there.over(

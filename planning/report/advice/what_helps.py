@@ -22,17 +22,19 @@ def with_relaxations(
 ) -> Coverage:
     """Return the claims' coverage with what would let devices reach enough.
 
-    Of mounts that can't be set to everything: with what that costs, too.
+    Of mounts that can't be set to everything: with what that costs, too. Of heads and
+    turntables only limits of projectors: cameras of the reference set have their own.
     """
+    alone = partial.stationed is None
     coverage, areas = claims.coverage, claims.coverage.target
     least = _asked_reach(partial.scene.requirements, "projector")
     if falls_short(areas.reachable_by_projectors_m2, areas.area_m2, least):
         with _timed(clock):
             relaxations = reachability_relaxations(
-                partial.scene, devices.reference_projectors
+                partial.scene, devices.reference_projectors, elsewhere=alone
             )
         coverage = coverage.changed(relaxations=relaxations)
-    if cameras_reach_too_little(partial.scene.requirements, coverage):
+    if alone and cameras_reach_too_little(partial.scene.requirements, coverage):
         with _timed(clock):
             causes, relaxations = out_of_reach(
                 partial.scene, partial.request.rig, devices, claims

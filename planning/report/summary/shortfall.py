@@ -161,7 +161,7 @@ def _reachable(
             "measured",
             areas.reachable_by_cameras_m2,
             areas.lit_m2,
-            f": {areas_line(coverage.unmeasurable_by_cause)}",
+            _unmeasurable(document),
             coverage.camera_relaxations,
         ),
     ):
@@ -194,6 +194,15 @@ def _steps(
         ),
         f"--min-reachable {rounded_down(share)} accepts what there is",
     )
+
+
+def _unmeasurable(document: PlanDocument) -> str:
+    """Why what is lit can't be measured; of heads and turntables it isn't known."""
+    if document.stations is not None:
+        return (
+            "; why, and what limit would help, isn't computed of heads and turntables"
+        )
+    return f": {areas_line(document.coverage.unmeasurable_by_cause)}"
 
 
 def _inside(document: PlanDocument) -> str:
