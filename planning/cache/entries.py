@@ -1,8 +1,8 @@
 """Entries of the cache in a folder: whole or none, and the oldest make room.
 
 An entry is a file named by its key. It is written beside and moved into place, so that
-readers, other runs and a kill see all of it or nothing; and it begins with a checksum,
-so that one that was damaged afterwards is none.
+readers, other runs and a kill see all of it or nothing; and it begins with a checksum
+of its key and bytes, so that one that was damaged or renamed afterwards is none.
 """
 
 import hashlib
@@ -65,7 +65,7 @@ class FolderEntries:
         except OSError:
             return None
         value = data[_SUM:]
-        if data[:_SUM] != _checksum(value):
+        if data[:_SUM] != _checksum(key, value):
             with suppress(OSError):
                 path.unlink()
             return None
@@ -83,7 +83,8 @@ class FolderEntries:
         try:
             self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             write_atomically(
-                self._path(key), lambda file: file.writelines((_checksum(value), value))
+                self._path(key),
+                lambda file: file.writelines((_checksum(key, value), value)),
             )
         except OSError as error:
             raise OSError(error.errno, error.strerror, str(self.folder)) from None
@@ -131,5 +132,5 @@ def _partial(path: Path) -> bool:
     return path.suffix != _SUFFIX
 
 
-def _checksum(value: bytes) -> bytes:
-    return hashlib.blake2b(value, digest_size=_SUM).digest()
+def _checksum(key: str, value: bytes) -> bytes:
+    return hashlib.blake2b(value, key=key.encode(), digest_size=_SUM).digest()

@@ -39,6 +39,14 @@ def test_a_damaged_entry_is_none_and_goes(entries, damage):
     assert not path.exists()
 
 
+def test_an_entry_under_another_key_is_none_and_goes(entries):
+    entries.put(KEYS[0], b"one")
+    (path,) = entries.folder.iterdir()
+    moved = path.rename(path.with_stem(KEYS[1]))
+    assert entries.get(KEYS[1]) is None
+    assert not moved.exists()
+
+
 def test_those_used_longest_ago_make_room(entries):
     for age, key in enumerate(KEYS[:4]):
         entries.put(key, bytes(1000))
