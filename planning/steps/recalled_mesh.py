@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from geometry.files.archives import file_bytes
-from geometry.files.readers import load_mesh
+from geometry.files.readers import load_mesh, mesh_of_bytes
 from geometry.mesh.file_origin import FileOrigin
 from geometry.mesh.mesh import TriangleMesh
 from planning.cache.cache import Cache
@@ -25,22 +25,20 @@ def recalled_mesh(
     Raises:
         MeshError: As `load_mesh`.
     """
-
-    def read() -> TriangleMesh:
-        return load_mesh(path, unit=unit, size_mm=size_mm)
-
     whole = path.is_file() and path.suffix.lower() != _SEVERAL_FILES
     if cache.entries is None or not whole:
-        return read()
+        return load_mesh(path, unit=unit, size_mm=size_mm)
+    # The file may be saved anew meanwhile: what is hashed is what is read.
+    data = file_bytes(path)
 
     def parts() -> tuple[Any, ...]:
-        mesh = read()
+        mesh = mesh_of_bytes(path, data, unit=unit, size_mm=size_mm)
         assert mesh.origin is not None
         told = {name: getattr(mesh.origin, name) for name in _ORIGIN}
         told |= {name: dict(getattr(mesh.origin, name)) for name in _PROPERTIES}
         return mesh.vertices, mesh.faces, mesh.source, told
 
-    inputs = file_bytes(path), path.suffixes, unit, size_mm
+    inputs = data, path.suffixes, unit, size_mm
     vertices, faces, source, origin = cache.recall("load_mesh", inputs, parts)
     source = replace(source, path=str(path))
     return TriangleMesh(vertices, faces, source, FileOrigin(**origin))

@@ -5,7 +5,8 @@ import pytest
 from support.plain_shapes import box
 
 from geometry.curvature import curvature
-from planning import Cache, load_rig, plan_rig, prepare
+from geometry.files.archives import file_bytes
+from planning import Cache, load_mesh, load_rig, plan_rig, prepare
 from planning.handover.handed_plan import HandedPlan
 from planning.steps.recalled_mesh import recalled_mesh
 
@@ -76,7 +77,7 @@ def test_the_command_finds_what_an_earlier_run_left_and_plans_the_same(
     monkeypatch.setenv("RINGRIG_CACHE", str(tmp_path / "cache"))
     first = planned()
     with pytest.MonkeyPatch.context() as patch:
-        _refuse(patch, [*DEAR, "recalled_mesh.load_mesh"])
+        _refuse(patch, [*DEAR, "recalled_mesh.mesh_of_bytes"])
         second = planned(*other)
     for (plan, surface), (cached, kept) in zip(bare, (first, second), strict=True):
         _same(plan, cached)
@@ -94,7 +95,7 @@ def test_a_file_that_moved_or_changed_is_told_as_it_is(tmp_path, block, monkeypa
 
     first = read(block)
     with monkeypatch.context() as patch:
-        _refuse(patch, ["recalled_mesh.load_mesh"])
+        _refuse(patch, ["recalled_mesh.mesh_of_bytes"])
         second = read(moved)
     assert (first.source.path, second.source.path) == (str(block), str(moved))
     assert first.source.sha256 == second.source.sha256
@@ -103,6 +104,26 @@ def test_a_file_that_moved_or_changed_is_told_as_it_is(tmp_path, block, monkeypa
     assert read(block, unit="cm").size == pytest.approx(10.0 * first.size)
     moved.write_text(text.replace("v -", "v -1", 1))
     assert read(moved).size > 1.5 * first.size
+
+
+def test_a_file_saved_while_it_is_read_leaves_no_other_mesh(
+    tmp_path, block, monkeypatch
+):
+    path, text, cache = tmp_path / "a.obj", block.read_text(), Cache.in_memory()
+    path.write_text(text)
+
+    def saved_afterwards(path):
+        data = file_bytes(path)
+        path.write_text(text.replace("v -", "v -1", 1))
+        return data
+
+    with monkeypatch.context() as patch:
+        patch.setattr("planning.steps.recalled_mesh.file_bytes", saved_afterwards)
+        first = recalled_mesh(path, cache, unit=None, size_mm=None)
+    path.write_text(text)
+    again = recalled_mesh(path, cache, unit=None, size_mm=None)
+    assert first.source == again.source == load_mesh(path).source
+    np.testing.assert_array_equal(first.vertices, again.vertices)
 
 
 def test_a_prepared_planner_answers_as_plan_rig_does(rig):
