@@ -1,6 +1,9 @@
 """What each number of projectors and cameras gives: the points of a front."""
 
 import math
+from typing import Annotated
+
+from pydantic import Field
 
 from planning.model.document.part import Count, Part
 from planning.model.document.ring_records import AxisTaken
@@ -66,14 +69,14 @@ class Front(Part):
         asked: Shares that `meets` speaks of.
     """
 
-    area_m2: float
+    area_m2: Annotated[float, Field(gt=0.0)]
     reachable_by_projectors_m2: float
     samples: Count
     fresh_samples: Count
     projector_candidates: Count
     camera_candidates: Count
     asked: dict[str, float]
-    points: tuple[FrontPoint, ...]
+    points: Annotated[tuple[FrontPoint, ...], Field(min_length=1)]
 
     def at_most_share(self, point: FrontPoint) -> float:
         """Return the share of the target that no so many candidates exceed.

@@ -10,7 +10,7 @@ from geometry.shapes.primitives import sphere
 from geometry.shapes.sample_head.sample_head import sample_head
 from planning import load_rig
 from planning.cameras import camera_cover
-from planning.model.errors import InputError, PlanFileError
+from planning.model.errors import InputError
 from planning.model.progress import Stopwatch
 from planning.pipeline import plan_rig
 from planning.projectors.candidate_set import CandidateSource
@@ -170,7 +170,7 @@ def test_a_taken_point_claims_what_the_front_said_without_a_matrix(
 def test_a_changed_mesh_rig_seed_or_requirement_is_refused_by_name(folder, mesh, rig):
     front = read_front(folder)
     moved = replace_vertices(mesh)
-    other = rig.replace(placement={"n_candidate_projectors": 31})
+    other = rig.replace(placement={"n_candidate_projectors": 700})
     ready = ready_for(mesh, rig)
     arm = Obstruction("arm", sphere(0.05, subdivisions=1), 1e-4)
     among = replace(ready, scene=replace(ready.scene, obstructions=(arm,)))
@@ -196,35 +196,6 @@ def test_the_same_front_with_any_number_of_threads(kept, mesh, rig):
     for one, file in zip((kept, again), files, strict=True):
         one.write(file)
     assert files[0].getvalue() == files[1].getvalue()
-
-
-def test_damaged_files_are_refused_in_one_line(folder, tmp_path):
-    whole = (folder / FRONT_FILE).read_bytes()
-    path = tmp_path / FRONT_FILE
-    with pytest.raises(InputError, match="no such file; make the front again"):
-        read_front(tmp_path)
-    middle = len(whole) // 2
-    flipped = whole[:middle] + bytes([whole[middle] ^ 255]) + whole[middle + 1 :]
-    later, entry = bytearray(whole), whole.rindex(b"PK\x01\x02")
-    later[entry + 6] = 143
-    for broken in (b"", b"no zip", whole[:middle], flipped, bytes(later)):
-        path.write_bytes(broken)
-        with pytest.raises(PlanFileError, match="no front, or a damaged one") as caught:
-            read_front(tmp_path)
-        assert "\n" not in str(caught.value)
-    with np.load(folder / FRONT_FILE) as file:
-        arrays = dict(file)
-    for name, value in (
-        ("projector_poses", arrays["projector_poses"][1:]),
-        ("camera_poses", np.full_like(arrays["camera_poses"], np.nan)),
-        ("camera_models", arrays["camera_models"] - 1),
-    ):
-        np.savez(path, **(arrays | {name: value}))
-        with pytest.raises(PlanFileError, match="don't fit together"):
-            read_front(tmp_path)
-    np.savez(path, head=np.array('{"format": "other"}'))
-    with pytest.raises(PlanFileError, match="damaged"):
-        read_front(tmp_path)
 
 
 def test_figures_are_of_poses_as_they_are_written(kept, mesh, rig):

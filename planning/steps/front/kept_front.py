@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -25,7 +25,7 @@ from planning.scene.placed_bodies import Device, existing_devices, movable
 from .front_matrix import FrontMatrix
 
 FRONT_FILE = "pareto.npz"
-_FORMAT, _VERSION = "ringrig-front", 1
+_FORMAT, _VERSION = "ringrig-front", 2
 _ARRAYS = (
     *("stages", "seen", "projector_poses", "projector_rings", "projector_models"),
     *("camera_poses", "camera_models", "point_rings"),
@@ -87,7 +87,7 @@ class KeptFront:
             "front": self.front.to_document(),
         }
         arrays: Any = self.arrays | {"head": np.array(json.dumps(head))}
-        np.savez_compressed(file, **arrays)
+        np.savez_compressed(file, **arrays, content=np.array(_content(arrays)))
 
     def rings_of(self, point: FrontPoint) -> NDArray[np.float64]:
         """Return the ring frames of a point's projectors, shape (k, 4, 4)."""
@@ -103,9 +103,25 @@ class KeptFront:
 
         Raises:
             InputError: If they are others.
+            PlanFileError: If the arrays are of other samples, models or devices.
         """
         self._check(digests_of(ready))
         kept, scene = self.arrays, ready.scene.without_floors
+        samples = scene.target_samples(DRAWS.projectors)
+        standing = existing_devices(scene.requirements, ready.templates)
+        placed = existing_devices(scene.requirements, ready.cameras)
+        n = len(samples)
+        columns = len(standing) + len(kept["projector_poses"])
+        if not (
+            kept["stages"].shape == (n, columns)
+            and kept["seen"].shape[1] == len(placed) + len(kept["camera_poses"])
+            and kept["projector_models"].max(initial=0) < len(ready.templates)
+            and kept["camera_models"].max(initial=0) < len(ready.cameras)
+        ):
+            raise PlanFileError(
+                f"{FRONT_FILE}: is a damaged front (its arrays don't fit the mesh and "
+                f"rig); {_AGAIN}"
+            )
         projectors = tuple(
             replace(
                 ready.templates[model], world_from_device=pose, world_from_ring=rings
@@ -122,18 +138,16 @@ class KeptFront:
                 kept["camera_poses"], kept["camera_models"].tolist(), strict=True
             )
         )
-        standing = existing_devices(scene.requirements, ready.templates)
         candidates = CandidateSet(
             scene,
-            scene.target_samples(DRAWS.projectors),
+            samples,
             (*standing, *projectors),
             kept["stages"],
             len(standing),
         )
-        n = len(kept["stages"])
         return FrontMatrix(
             candidates,
-            (*existing_devices(scene.requirements, ready.cameras), *cameras),
+            (*placed, *cameras),
             np.unpackbits(kept["seen"], axis=0, count=n).astype(bool),
         )
 
@@ -158,25 +172,43 @@ def read_front(folder: Path) -> KeptFront:
         try:
             with path.open("rb") as opened, np.load(opened) as file:
                 head = json.loads(str(file["head"]))
-                arrays = {name: file[name] for name in _ARRAYS}
-            _hold_together(arrays)
-            known = head["format"], head["version"]
-            kept = KeptFront(Front(**head["front"]), dict(head["digests"]), arrays)
+                known = head["format"], head["version"]
+                kept = _whole(head, file) if known == (_FORMAT, _VERSION) else None
         except (ValueError, KeyError, *DAMAGED) as error:
             what = "a field" if isinstance(error, ValidationError) else str(error)
             raise PlanFileError(
                 f"{path}: is no front, or a damaged one ({what}); {_AGAIN}"
             ) from None
-    if known != (_FORMAT, _VERSION):
+    if kept is None:
         raise PlanFileError(
-            f"{path}: is {known[0]!r} of version {known[1]}, and {_FORMAT!r} of "
-            f"version {_VERSION} is read; {_AGAIN}"
+            f"{path}: is {known[0]!r} of version {known[1]!r}, and {_FORMAT!r} of "
+            f"version {_VERSION!r} is read; {_AGAIN}"
         )
     return kept
 
 
-def _hold_together(arrays: dict[str, NDArray[Any]]) -> None:
-    """Raise ValueError unless candidates have a pose, a model and a column each."""
+def _whole(head: dict[str, Any], file: Mapping[str, NDArray[Any]]) -> KeptFront:
+    """Return the front of a file; raise ValueError unless it is as it was written."""
+    arrays = {name: file[name] for name in _ARRAYS}
+    if str(file["content"]) != _content(arrays | {"head": file["head"]}):
+        raise ValueError("its content isn't what was written")
+    front = Front(**head["front"])
+    _hold_together(front, arrays)
+    return KeptFront(front, dict(head["digests"]), arrays)
+
+
+def _content(arrays: dict[str, NDArray[Any]]) -> str:
+    """Return a digest of the head and all arrays."""
+    every = ((name, arrays[name]) for name in ("head", *_ARRAYS))
+    return _digest(*(p for name, a in every for p in (name, a.dtype.str, a.shape, a)))
+
+
+def _hold_together(front: Front, arrays: dict[str, NDArray[Any]]) -> None:
+    """Raise ValueError unless points and candidates have all that is told of them.
+
+    Candidates a pose, a model and a column each, points a ring frame and a column for
+    each of their devices.
+    """
     poses = {name: arrays[f"{name}_poses"] for name in ("projector", "camera")}
     frames = *poses.values(), arrays["projector_rings"], arrays["point_rings"]
     models = [arrays[f"{name}_models"] for name in poses]
@@ -188,8 +220,18 @@ def _hold_together(arrays: dict[str, NDArray[Any]]) -> None:
         and all(m.min(initial=0) >= 0 for m in models)
         and len(arrays["projector_rings"]) == len(poses["projector"])
         and all(arrays[name].ndim == 2 for name in ("stages", "seen"))
-        and arrays["stages"].shape[1] >= len(poses["projector"])
-        and arrays["seen"].shape[1] >= len(poses["camera"])
+        and arrays["stages"].dtype == np.int8
+        and arrays["seen"].dtype == np.uint8
+        and len(arrays["seen"]) == -(-len(arrays["stages"]) // 8)
+        and len(arrays["point_rings"]) == sum(p.projectors for p in front.points)
+        and all(
+            0 < len({*taken}) == len(taken) == count and max(taken) < columns
+            for point in front.points
+            for taken, count, columns in (
+                (point.lights, point.projectors, arrays["stages"].shape[1]),
+                (point.views, point.cameras, arrays["seen"].shape[1]),
+            )
+        )
     ):
         raise ValueError("its arrays don't fit together")
 
