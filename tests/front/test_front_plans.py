@@ -20,7 +20,7 @@ from planning.scene.draws import DRAWS
 from planning.scene.measuring.measured import lit_samples, measured_by
 from planning.scene.placed_bodies import Obstruction
 from planning.steps.asked.request import request_of
-from planning.steps.front import front_matrix
+from planning.steps.front import front_matrix, taken_point
 from planning.steps.front import plan_front as fronts
 from planning.steps.front.choices import Choice
 from planning.steps.front.fresh_figures import FreshFigures
@@ -165,6 +165,34 @@ def test_a_taken_point_claims_what_the_front_said_without_a_matrix(
     projectors = plan.document.certificates.projectors
     assert projectors.count == count[0]
     assert projectors.n_samples == front.front.samples
+
+
+def test_wider_margins_are_not_taken_where_less_is_measured(
+    kept, mesh, rig, monkeypatch
+):
+    """Here they let one candidate in the place of all light what they can."""
+    matrix = kept.matrix(ready_for(mesh, rig))
+    lit = matrix.candidates.lit.sum(axis=0)
+    (dim,) = matrix.candidates.of(np.flatnonzero(lit == lit[lit > 0].min())[:1])
+
+    def moved(_, stage):
+        pose = dim.world_from_device
+        return tuple(replace(p, world_from_device=pose) for p in stage.projectors)
+
+    monkeypatch.setattr(taken_point, "widen_margins", moved)
+    point = kept.front.point(1, 2)
+    request = ready_for(mesh, rig, max_projectors=1).request
+    search = TakenPoint(kept, point)._sought(request, Stopwatch())
+    partial, _ = next(search)
+    candidates = matrix.candidates.of(np.array(point.lights))
+    for mine, its in zip(partial.projectors, candidates, strict=True):
+        np.testing.assert_array_equal(mine.world_from_device, its.world_from_device)
+    for mine, place in zip(partial.cameras, point.views, strict=True):
+        its = matrix.cameras[place]
+        np.testing.assert_array_equal(mine.world_from_device, its.world_from_device)
+    measured = partial.camera_stage.cover.selection.n_covered / len(matrix.target)
+    said = share(point, kept.front)
+    assert measured >= said - 2 * error(said, len(matrix.target))
 
 
 def test_a_changed_mesh_rig_seed_or_requirement_is_refused_by_name(folder, mesh, rig):

@@ -26,6 +26,7 @@ from .best_counts import with_more
 from .front_matrix import FrontMatrix
 
 _Projectors = tuple[PlannedProjector, ...]
+_Rig = tuple[_Projectors, CameraStage]
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +46,7 @@ class PointCameras:
 
     def placed(
         self, projectors: _Projectors, axes: AxisTaken | None, margin: float
-    ) -> tuple[_Projectors, CameraStage]:
+    ) -> _Rig:
         """Return the projectors with their ring axes, and the cameras."""
         if axes == "centred":
             projectors = centred_axes(self.scene, projectors, margin)
@@ -57,6 +58,25 @@ class PointCameras:
             samples, measured = self._measured(projectors)
             chosen = self._chosen(measured, samples, chosen)
         return projectors, self._stage(samples, measured, chosen)
+
+    def left(
+        self, projectors: _Projectors, axes: AxisTaken | None, margin: float
+    ) -> _Rig:
+        """Return the point's own projectors, with the axes and cameras it has."""
+        if axes != "free" or self.point.axes != "free":
+            return self.placed(projectors, axes, margin)
+        chosen = np.array(self.point.views, dtype=np.int64)
+        return projectors, self._stage(*self._measured(projectors), chosen)
+
+    def keep_the_point(self, rig: _Rig) -> bool:
+        """Return whether as much is measured as the point says, and enough if it is."""
+        found = rig[1].cover.selection
+        enough = not self.point.meets or found.status != "infeasible"
+        return enough and found.n_covered >= self.share * len(self.matrix.target)
+
+    def worth(self, rig: _Rig) -> tuple[bool, int]:
+        """Return what the better of two rigs has more of."""
+        return self.keep_the_point(rig), rig[1].cover.selection.n_covered
 
     def _with_axes_for(
         self,

@@ -60,7 +60,15 @@ class TakenPoint:
         with clock.stage("cameras", "cameras: those of the point, for these poses"):
             share = self.point.measured_m2 / self.kept.front.area_m2
             cameras = PointCameras(ready.scene, matrix, self.point, share)
-            projectors, views = cameras.placed(projectors, axes, request.ring_margin)
+            found = cameras.placed(projectors, axes, request.ring_margin)
+            if not cameras.keep_the_point(found):
+                # Wider margins keep what is lit, and not all that is measured of it.
+                before = with_exposures(ready.scene, stage.projectors)
+                left = cameras.left(before, axes, request.ring_margin)
+                found = max(found, left, key=cameras.worth)
+                if found is left:
+                    clock.say("  wider margins not taken: less would be measured")
+            projectors, views = found
         partial = PartialPlan(
             *(ready, stage, projectors, views, views.cameras), axes=axes
         )
