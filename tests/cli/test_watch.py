@@ -14,6 +14,7 @@ from support.plain_shapes import box
 
 from planning.cache.entries import FolderEntries
 from planning.cli.main import commands
+from planning.cli.plans import watch_command
 
 RUN = [sys.executable, "-c", LITTLE + "from planning.cli.main import main; main()"]
 
@@ -46,12 +47,42 @@ def test_the_cache_is_shown_and_cleared(tmp_path, monkeypatch):
         (("--watch", "absent.toml"), "isn't a file"),
         (("--watch", __file__, "--rig", "x.toml"), "--rig or --watch"),
         (("--watch", __file__, "--json"), "--json is of one plan"),
+        (("--watch", "absent.toml", "--pareto"), "--pareto with --watch: a front"),
     ],
 )
 def test_what_cannot_be_watched_is_refused(words, said):
     result = _told("--mesh", "a.obj", "--max-projectors", "1", *words)
     assert result.exit_code == 2
     assert said in result.stderr
+
+
+@pytest.mark.parametrize("saved", ["rig.toml", "a.obj", "b.obj"])
+def test_each_mesh_of_a_family_is_watched(tmp_path, monkeypatch, capsys, saved):
+    for name in ("rig.toml", "a.obj", "b.obj"):
+        (tmp_path / name).write_text("as it was")
+    plans = []
+
+    def replanned(*_):
+        plans.append(saved)
+        (tmp_path / saved).write_text("saved meanwhile")
+        # As Ctrl-C ends a plan.
+        return (0 if len(plans) == 1 else 130), None
+
+    def asleep(seconds):
+        if seconds:
+            raise KeyboardInterrupt
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(watch_command, "_SETTLED_S", 0.0)
+    monkeypatch.setattr(watch_command, "_replanned", replanned)
+    monkeypatch.setattr(watch_command.time, "sleep", asleep)
+    asked = {"watch": "rig.toml", "ranges": None, "meshes": ("a.obj", "b.obj")}
+    asked |= {"no_cache": True, "quiet": False}
+    assert watch_command.watch_command(asked, []) == 130
+    assert plans == [saved, saved]
+    assert (
+        "waiting for rig.toml or one of 2 meshes to be saved" in capsys.readouterr()[1]
+    )
 
 
 @pytest.fixture

@@ -63,6 +63,10 @@ def check_front_options(options: dict[str, Any]) -> None:
     asked = "--pareto" if pareto else "--take"
     if (n := len(options["meshes"])) > 1:
         raise click.UsageError(f"{asked} is of one mesh, and there are {n}: give one")
+    if options["watch"] is not None:
+        raise click.UsageError(
+            f"{asked} with --watch: a front is of one rig; give --rig instead"
+        )
     counts = ("max_heads",) if pareto else ("max_projectors", "max_cameras")
     for name in ("max_heads", *counts):
         if options[name] is not None:

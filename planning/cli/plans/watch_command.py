@@ -1,4 +1,4 @@
-"""What `plan --watch` does: plan whenever the rig file or the mesh is saved."""
+"""What `plan --watch` does: plan whenever the rig file or a mesh is saved."""
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,8 +24,11 @@ _Stamps = tuple[tuple[int, int] | None, ...]
 
 def watch_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
     """Plan again and again until Ctrl-C; return the exit code of the last plan."""
-    files = options["watch"], options["ranges"] or options["meshes"][0]
-    paths = tuple(Path(file) for file in files)
+    # With ranges there is no mesh.
+    of_objects = options["meshes"] or (options["ranges"],)
+    paths = tuple(Path(file) for file in (options["watch"], *of_objects))
+    several = f"one of {len(of_objects)} meshes"
+    objects = of_objects[0] if len(of_objects) == 1 else several
     cache = cache_of(options)
     if cache.entries is None:
         cache = Cache.in_memory()
@@ -40,7 +43,7 @@ def watch_command(options: Mapping[str, Any], command: Sequence[str]) -> int:
         if last is not None and last[0] == InterruptedPlanError.exit_code:
             return last[0]
         try:
-            tell(f"waiting for {' or '.join(files)} to be saved; Ctrl-C ends")
+            tell(f"waiting for {paths[0]} or {objects} to be saved; Ctrl-C ends")
             _wait(paths, before)
         except KeyboardInterrupt:
             if last is None:
