@@ -1,7 +1,7 @@
 """`plan_rig` and `sweep` as a designer calls them, in scripts and notebooks."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import wraps
 from itertools import product
 from typing import Any, ParamSpec
@@ -50,18 +50,23 @@ class Planner:
     mesh: TriangleMesh | RangedBody
     rig: Rig
     cache: Cache
+    asked: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     def plan(self, **asked: Any) -> HandedPlan:  # noqa: ANN401
-        """Return what `plan_rig` does, with its options.
+        """Return what `plan_rig` does, with its options beside those of `prepare`.
 
         What doesn't hang on those that changed is known from before.
         """
-        options: dict[str, Any] = {"cache": self.cache, **asked}
+        options: dict[str, Any] = {"cache": self.cache, **self.asked, **asked}
         return plan_rig(self.mesh, self.rig, **options)
 
 
 def prepare(
-    mesh: TriangleMesh | RangedBody, rig: Rig, *, cache: Cache | None = None
+    mesh: TriangleMesh | RangedBody,
+    rig: Rig,
+    *,
+    cache: Cache | None = None,
+    **asked: Any,  # noqa: ANN401
 ) -> Planner:
     """Return what plans one mesh with one rig for requirements that change.
 
@@ -70,8 +75,10 @@ def prepare(
         rig: The rig.
         cache: What was answered before; None: one in memory. With `Cache.on_disk()`
             what the command line left is used, too, and the other way round.
+        asked: Options of `plan_rig` that every plan has unless it is given others:
+            `max_projectors=4`, so that there are devices to plan.
     """
-    return Planner(mesh, rig, cache or Cache.in_memory())
+    return Planner(mesh, rig, cache or Cache.in_memory(), asked)
 
 
 def sweep(

@@ -219,6 +219,7 @@ def standing_devices(rig: Rig) -> tuple[int, int]:
         raise InputError(
             f"{count_words(counts[0], 'projector')} and "
             f"{count_words(counts[1], 'camera')} stand; a rig measures with one of "
-            f"either or more"
+            f"either or more: place them, or have them planned with max_projectors, or "
+            f"max_heads of a [head]"
         )
     return counts

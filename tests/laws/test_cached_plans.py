@@ -6,7 +6,7 @@ from support.plain_shapes import box
 
 from geometry.curvature import curvature
 from geometry.files.archives import file_bytes
-from planning import Cache, load_mesh, load_rig, plan_rig, prepare
+from planning import Cache, InputError, load_mesh, load_rig, plan_rig, prepare
 from planning.handover.handed_plan import HandedPlan
 from planning.steps.recalled_mesh import recalled_mesh
 
@@ -130,14 +130,20 @@ def test_a_prepared_planner_answers_as_plan_rig_does(rig):
     mesh = box((0.1, 0.06, 0.03))
     asked = {"max_projectors": 3, "target": "surface", "dominant_coverage": 0.6}
     asked |= {"check": False, "cameras_by": "cover", "on_miss": "return"}
-    planner = prepare(mesh, rig)
-    planner.plan(coverage=0.95, **asked)
+    planner = prepare(mesh, rig, coverage=0.95, **asked)
+    assert planner.plan().requirements.coverage == 0.95
     with pytest.MonkeyPatch.context() as patch:
         _refuse(patch, DEAR)
-        plan = planner.plan(coverage=0.9, **asked)
+        plan = planner.plan(coverage=0.9)
     bare = plan_rig(mesh, rig, coverage=0.9, **asked)
     assert isinstance(plan, HandedPlan)
     _same(plan.to_document(), bare.to_document())
+
+
+def test_a_plan_of_no_devices_says_which_options_give_some(rig):
+    with pytest.raises(InputError, match=r"with max_projectors, or max_heads") as told:
+        prepare(box((0.1, 0.06, 0.03)), rig).plan(coverage=0.98)
+    assert "\n" not in str(told.value)
 
 
 @pytest.mark.long
