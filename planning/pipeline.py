@@ -38,7 +38,7 @@ from .steps.family.family_search import FamilyDraft, family_sought
 from .steps.front.taken_point import TakenPoint
 from .steps.joint.joining import jointly
 from .steps.prepare import prepared, standing_devices
-from .steps.refused import check_request
+from .steps.refused import check_request, check_values
 from .steps.stages import (
     bounded_cameras,
     bounded_projectors,
@@ -151,8 +151,7 @@ def plan_rig(
         checked: Receives it with what the check found.
         fixed: Devices that stay where they are and count, from `read_mounted`.
         take: A point of a front, whose numbers of devices and candidates are taken.
-        on_miss: Whether a plan that misses a requirement is raised with the error, or
-            returned.
+        on_miss: `raise` an error with a plan that misses a requirement, or `return` it.
         cache: What was answered before, and is kept for later runs: the plan is the
             same with any; the default keeps nothing.
 
@@ -165,6 +164,7 @@ def plan_rig(
         RequirementError: If a requirement is missed; it carries the best plan.
         TimeLimitError: If the time limit came before any plan.
     """
+    check_values(locals())
     rig = rig if fixed is None else fixed.on(rig)
     if take is not None:
         max_projectors, max_cameras = take.point.count

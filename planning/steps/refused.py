@@ -1,5 +1,15 @@
-"""What can't be asked together, told before any work."""
+"""What can't be asked at all, or not together, told before any work."""
 
+from collections.abc import Mapping
+from typing import TypeGuard, get_args
+
+import numpy as np
+
+from planning.cache.cache import Cache
+from planning.model.document.certificates import CamerasBy
+from planning.model.document.family_records import AlignedBy
+from planning.model.document.ring_records import RingAxis
+from planning.model.errors import InputError
 from planning.report.partial_plan import PlanRequest
 
 from .asked.family_request import check_family
@@ -7,6 +17,56 @@ from .cameras_alone.refusals import check_alone
 from .joint.joining import check_joint
 from .stations.carried import check_carried
 from .surviving import check_survival
+
+# Of options of `plan_rig` whose values nothing that comes later refuses in a line: the
+# values, the least whole number, and those that are any number.
+_VALUES: dict[str, tuple[object, ...]] = {
+    "align": get_args(AlignedBy),
+    "cameras_by": get_args(CamerasBy),
+    "on_miss": ("raise", "return"),
+    "ring_axis": (None, *get_args(RingAxis)),
+    **dict.fromkeys(("joint", "check", "prove"), (True, False)),
+}
+_LEAST = {
+    **{"seed": 0, "survive": 0, "max_projectors": 0, "max_cameras": 0},
+    **{"threads": 1, "views": 1, "max_heads": 1},
+}
+_NUMBERS = (
+    *("coverage", "dominant_coverage", "min_reachable", "region_coverage"),
+    *("accuracy_mm", "family_quantile", "robust", "time_limit"),
+)
+_NEVER_NONE = ("seed", "survive", "family_quantile")
+
+
+def check_values(asked: Mapping[str, object]) -> None:
+    """Refuse values that an option of `plan_rig` doesn't have, before any work.
+
+    Raises:
+        InputError: It names the option, its value and what that must be.
+    """
+    for name, value in asked.items():
+        if must := _must_be(name, value):
+            raise InputError(f"{name} = {value!r} must be {must}")
+
+
+def _must_be(name: str, value: object) -> str:
+    """Return what the value of an option must be and isn't; empty: it may be that."""
+    if name in _VALUES and value not in _VALUES[name]:
+        return f"one of {', '.join(map(str, _VALUES[name]))}"
+    if name == "cache" and not isinstance(value, Cache):
+        return "a Cache; leave it out to keep nothing"
+    if value is None and name not in _NEVER_NONE:
+        return ""
+    if name in _LEAST and not (_whole(value) and value >= _LEAST[name]):
+        return f"a whole number from {_LEAST[name]}"
+    real = isinstance(value, float | np.floating) and not np.isnan(value)
+    if name in _NUMBERS and not (real or _whole(value)):
+        return "a number"
+    return ""
+
+
+def _whole(value: object) -> TypeGuard[int]:
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)
 
 
 def check_request(request: PlanRequest) -> None:
