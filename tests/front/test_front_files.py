@@ -5,9 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from click import UsageError
 from support.plain_shapes import box
 
 from planning import load_rig
+from planning.cli.plans.kept_fronts import taken_point
 from planning.model.errors import InputError, PlanFileError
 from planning.model.progress import Stopwatch
 from planning.rig.wishes import Wishes
@@ -153,3 +155,18 @@ def test_arrays_of_another_mesh_or_rig_are_refused(kept, ready, change):
     others = {name: value(kept.arrays[name]) for name, value in change.items()}
     with pytest.raises(PlanFileError, match="don't fit the mesh and rig"):
         replace(kept, arrays=kept.arrays | others).matrix(ready)
+
+
+def test_more_devices_are_advised_beyond_a_front_alone(kept, folder, tmp_path):
+    with pytest.raises(UsageError, match=r"--max-projectors 2 --max-cameras 2$"):
+        taken_point((2, 1), folder)
+    # A projector and two cameras stand: columns without a pose, and no smaller point.
+    columns = {"stages": 1, "seen": 2}
+    more = {k: np.pad(kept.arrays[k], ((0, 0), (n, 0))) for k, n in columns.items()}
+    front = kept.front.changed(points=kept.front.points[1:])
+    arrays = kept.arrays | more | {"point_rings": kept.arrays["point_rings"][1:]}
+    with (tmp_path / FRONT_FILE).open("wb") as file:
+        replace(kept, front=front, arrays=arrays).write(file)
+    said = "take one of these: 1 projector and 2 cameras stand already, and are in each"
+    with pytest.raises(UsageError, match=f"{said}$"):
+        taken_point((1, 1), tmp_path)

@@ -7,7 +7,8 @@ from typing import Any
 import click
 
 from planning.model.front import Front
-from planning.steps.front.kept_front import FRONT_FILE, read_front
+from planning.model.words import count_words
+from planning.steps.front.kept_front import FRONT_FILE, KeptFront, read_front
 from planning.steps.front.taken_point import TakenPoint
 
 
@@ -33,8 +34,7 @@ def taken_point(count: tuple[int, int], folder: Path) -> TakenPoint:
     if point is None:
         raise click.UsageError(
             f"--take {count[0]},{count[1]}: the front in {folder} has "
-            f"{_extent(kept.front)}; take one of these, or make it larger with "
-            f"--pareto --max-projectors {count[0]} --max-cameras {count[1]}"
+            f"{_extent(kept.front)}; take one of these{_remedy(count, kept)}"
         )
     return TakenPoint(kept, point)
 
@@ -43,3 +43,20 @@ def _extent(front: Front) -> str:
     """Say which points there are."""
     p, c = (sorted({one.count[k] for one in front.points}) for k in (0, 1))
     return f"{p[0]} to {p[-1]} projectors and {c[0]} to {c[-1]} cameras"
+
+
+def _remedy(count: tuple[int, int], kept: KeptFront) -> str:
+    """Say why there are no fewer devices, or how to get more."""
+    stand, points = kept.standing, kept.front.points
+    if count[0] < stand[0] or count[1] < stand[1]:
+        return (
+            f": {count_words(stand[0], 'projector')} and "
+            f"{count_words(stand[1], 'camera')} stand already, and are in each"
+        )
+    p, c = (max(one.count[k] for one in points) for k in (0, 1))
+    if count[0] > p or count[1] > c:
+        return (
+            f", or make it larger with --pareto --max-projectors {max(p, count[0])} "
+            f"--max-cameras {max(c, count[1])}"
+        )
+    return ""

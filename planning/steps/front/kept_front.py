@@ -89,6 +89,15 @@ class KeptFront:
         arrays: Any = self.arrays | {"head": np.array(json.dumps(head))}
         np.savez_compressed(file, **arrays, content=np.array(_content(arrays)))
 
+    @property
+    def standing(self) -> tuple[int, int]:
+        """How many projectors and cameras stand already: they have no candidate."""
+        arrays = self.arrays
+        return (
+            arrays["stages"].shape[1] - len(arrays["projector_poses"]),
+            arrays["seen"].shape[1] - len(arrays["camera_poses"]),
+        )
+
     def rings_of(self, point: FrontPoint) -> NDArray[np.float64]:
         """Return the ring frames of a point's projectors, shape (k, 4, 4)."""
         before = [p.projectors for p in self.front.points[: self._place(point)]]
