@@ -136,6 +136,7 @@ def asks(plan, **changes):
     [
         ({"command": []}, "no words of a command are recorded"),
         ({"command": ["plan", *WORDS.split(), "--pareto"]}, "one of several"),
+        ({"command": ["plan", "x.obj", "--take", "2,1"]}, "one of several"),
         ({"command": ["plan", "--mesh", "x.obj", "--madness"]}, "--madness"),
         ({"command": ["plan", "verify", "x"]}, "give --max-projectors"),
         ({"command": ["plan", "--help"]}, "No such option"),

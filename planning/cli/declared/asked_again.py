@@ -50,9 +50,9 @@ def asked_again(
             as_of_plans(options)
         else:
             check_options(options)
+            if any(options[name] for name in _NOT_ALONE):
+                raise click.UsageError("its plan is one of several")
             check_projectors(options)
-        if any(options[name] for name in _NOT_ALONE):
-            raise click.UsageError("its plan is one of several")
         if plan.document.truncated:
             raise click.UsageError("the run was cut, and another isn't cut there")
     except click.ClickException as error:
