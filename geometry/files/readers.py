@@ -44,6 +44,8 @@ def load_mesh(
         MeshError: If the file can't be read whole, holds no surface, or has a longest
             side outside 1 mm to 100 m.
     """
+    # A slip in the words is told before a file is looked for.
+    _check_scale(unit, size_mm)
     return mesh_of_bytes(path, file_bytes(path), unit=unit, size_mm=size_mm)
 
 
@@ -55,6 +57,12 @@ def mesh_of_bytes(
     size_mm: float | None = None,
 ) -> TriangleMesh:
     """Return the mesh of a file with these bytes, as `load_mesh` does."""
+    _check_scale(unit, size_mm)
+    digest = hashlib.sha256(data).hexdigest()
+    return usable_mesh(_read(path, data), str(path), digest, unit, size_mm)
+
+
+def _check_scale(unit: str | None, size_mm: float | None) -> None:
     if unit is not None and size_mm is not None:
         raise MeshError(
             f"unit {unit} and size {size_mm} mm both fix the scale: give one"
@@ -63,8 +71,6 @@ def mesh_of_bytes(
         raise MeshError(f"unit '{unit}' isn't known, use one of {', '.join(UNITS)}")
     if size_mm is not None and not (size_mm > 0 and np.isfinite(size_mm)):
         raise MeshError(f"size must be a positive number of millimetres, got {size_mm}")
-    digest = hashlib.sha256(data).hexdigest()
-    return usable_mesh(_read(path, data), str(path), digest, unit, size_mm)
 
 
 def usable_mesh(
