@@ -18,13 +18,13 @@ from planning.cli.main import commands
 from planning.model.errors import PlanningError
 from planning.model.plan import RigPlan
 from planning.report.made_again import again_or_why_not
-from planning.rig.rig import Rig
 from planning.scene.draws import DRAWS
 from planning.verify.verification import Verification, verify_plan
 from support.drawn_jobs import Job
 from support.little_work import (
     bound_roughly,
     draw_fewer,
+    offer_fewer,
     work_least,
     work_little,
 )
@@ -120,8 +120,7 @@ def _working_little(job: Job) -> Generator[None]:
             # How far light reaches is held to a twentieth: few samples don't tell. Nor
             # do covers of fewer than the audit takes them to be chosen on.
             draw_fewer(patch, axes=_AXES, projectors=_COVERED, cameras=_COVERED)
-            patch.setattr(Rig, "n_projector_poses", 80)
-            patch.setattr(Rig, "n_camera_poses", 60)
+            offer_fewer(patch, 80, 60)
         # A run that was cut ends itself, not this process.
         patch.setattr("planning.cli.console.leave", sys.exit)
         yield

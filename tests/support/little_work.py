@@ -41,8 +41,8 @@ _LOOKING = (
     (inside_claims, "_PLANNER_SPOTS", 3000),
     (inside_claims, "_MAX_SAMPLES", 1500),
 )
-# Poses offered: a rig file can ask for no fewer than 600 and 400.
-_POSES = {"n_projector_poses": 160, "n_camera_poses": 120}
+# Poses of projectors and cameras offered; a rig file can ask for 600 and 400 at least.
+_POSES = 160, 120
 # Samples that devices and rings are fitted to, and that confirm them, where a plan is
 # compared with itself: whatever it is, both are.
 _FEWEST = {
@@ -97,11 +97,11 @@ def draw_fewer(patch, **counts):
         patch.setitem(vars(DRAWS), name, draw)
 
 
-def offer_fewer(patch):
+def offer_fewer(patch, projectors=_POSES[0], cameras=_POSES[1]):
     """Let fewer poses be offered than a rig file can ask for, until it is undone."""
-    for name, count in _POSES.items():
-        patch.setattr(Rig, name, count)
-    least = {name.split("_")[1]: count for name, count in _POSES.items()}
+    patch.setattr(Rig, "n_projector_poses", projectors)
+    patch.setattr(Rig, "n_camera_poses", cameras)
+    least = {"projector": projectors, "camera": cameras}
     patch.setattr(offered_again, "_LEAST", least)
 
 
