@@ -58,7 +58,7 @@ def _must_be(name: str, value: object) -> str:
     if value is None and name not in _NEVER_NONE:
         return ""
     if name in _LEAST and not (_whole(value) and value >= _LEAST[name]):
-        return f"a whole number from {_LEAST[name]}"
+        return f"a whole number, {_LEAST[name]} or more"
     real = isinstance(value, float | np.floating) and not np.isnan(value)
     if name in _NUMBERS and not (real or _whole(value)):
         return "a number"

@@ -19,6 +19,7 @@ from planning.model.document.made_with import MadeWith
 from planning.model.errors import InfeasibleLimitsError, InputError, TimeLimitError
 from planning.model.plan import InterruptedPlanError, RequirementError
 from planning.model.progress import Stopwatch
+from planning.model.words import percent
 from planning.report.summary.summary import summary
 from planning.steps import stages
 from planning.steps.checked import axes_may_help
@@ -272,7 +273,7 @@ def test_a_small_workspace_does_not_pass_by_a_shrinking_denominator(tmp_path):
     areas = plan.to_document()["coverage"]["target"]
     share = areas["reachable_by_projectors_m2"] / areas["area_m2"]
     assert share < 0.9
-    assert f"{100 * share:.1f} %" in lines[0]
+    assert percent(share, asked=0.9) in lines[0]
     assert "--min-reachable" in lines[0]
     assert "the whole shell as workspace would reach 100.0 %" in lines[0]
     axis = np.array([0.0, -1.0, 0.0])
