@@ -38,6 +38,7 @@ def plan(monkeypatch, capsys, tmp_path):
     return run
 
 
+@pytest.mark.long
 def test_a_rig_as_it_stands_has_a_folder_like_a_plans(plan, tmp_path, monkeypatch):
     draw_fewer(monkeypatch, claims=3000, overlaps=3000)
     words = ["plate.obj", "--poses", "mounted.csv", "--target", "surface", "--json"]

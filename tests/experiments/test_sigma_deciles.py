@@ -34,6 +34,7 @@ def test_errors_are_s_n_in_every_decile_of_conditioning(found):
     assert ball.scale("by_blur") == pytest.approx(scale, rel=0.1)
 
 
+@pytest.mark.long
 def test_the_law_of_planning_leaves_out_what_blur_does_and_stays_safe(found):
     flat, ball = found
     scale = flat.scale("plain")

@@ -103,6 +103,7 @@ def test_plates_that_face_apart_take_twice_what_one_takes(both, rig, few):
         assert told.over_poses.lower_bound == 1
 
 
+@pytest.mark.long
 def test_a_member_that_is_short_of_devices_says_what_it_takes(rig, few):
     """One device can't serve plates back to back; the other member takes one."""
     said: list[str] = []
@@ -143,6 +144,7 @@ def test_no_plate_is_in_the_way_of_the_other(both):
         assert areas.measured_m2 > 0.95 * areas.area_m2
 
 
+@pytest.mark.long
 def test_the_share_of_members_that_is_asked_saves_devices(rig, few):
     three = [plate(1), plate(-1), plate(1, 0.04)]
     half = planned(rig, three, family_quantile=0.6, pattern="dense")
@@ -181,6 +183,7 @@ def test_a_member_that_no_light_reaches_is_left_out_before_one_that_costs(
     assert (verified.failures, verified.unmet) == ((), ())
 
 
+@pytest.mark.long
 def test_the_worst_member_is_one_that_misses_something(rig, few, shut):
     family = planned(rig, [plate(1), shut], pattern="dense")
     assert family.document.family.worst == 1

@@ -126,6 +126,7 @@ def test_a_file_saved_while_it_is_read_leaves_no_other_mesh(
     np.testing.assert_array_equal(first.vertices, again.vertices)
 
 
+@pytest.mark.long
 def test_a_prepared_planner_answers_as_plan_rig_does(rig):
     mesh = box((0.1, 0.06, 0.03))
     asked = {"max_projectors": 3, "target": "surface", "dominant_coverage": 0.6}

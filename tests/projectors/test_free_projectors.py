@@ -123,6 +123,7 @@ def upright(axis):
     return TriangleMesh(plate.vertices @ np.array(turned).T, plate.faces)
 
 
+@pytest.mark.long
 def test_two_projectors_light_a_cross_for_which_candidates_need_three(monkeypatch):
     """Light along a plate's normal runs along the other, which then has no shadow.
 

@@ -120,6 +120,7 @@ def test_what_no_poses_can_do_is_given_up(lattice):
 
 
 @pytest.mark.parametrize(("count", "near"), [(5, False), (6, True)])
+@pytest.mark.long
 def test_a_finer_lattice_is_asked_for_where_it_comes_near(
     lattice, count, near, monkeypatch
 ):

@@ -137,6 +137,7 @@ def test_poses_that_may_be_of_another_plan_are_taken_on_trust(plan):
     assert "(reference_cameras in" in line
 
 
+@pytest.mark.long
 def test_fewer_cameras_are_proved_too_few_with_rings_as_written(short):
     """Finer rings than those that were covered for let candidates reach less."""
     assert found(short, again=None).failures == ()
@@ -153,6 +154,7 @@ def test_a_target_of_next_to_no_area_is_false_and_no_crash(plan):
     assert any(line.startswith("coverage.target.area_m2") for line in failures)
 
 
+@pytest.mark.long
 def test_why_cameras_reach_too_little_comes_out_again(short):
     honest = found(short)
     assert honest.failures == ()

@@ -144,7 +144,9 @@ class PartBounds:
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Bounds (p,), and which sets the costliest selections take, (p, n_s)."""
         steps = np.floor(shares * (self._weights / self._grid))
-        payments = steps.astype(np.float32) @ self.covers.T
+        # Kernels of BLAS flag what they find beside short rows, now and then.
+        with np.errstate(invalid="ignore"):
+            payments = steps.astype(np.float32) @ self.covers.T
         self._budget.spend(
             2.0 * len(shares) * self.covers.size * _DENSE_UNIT
             + _CHOOSE * payments.size

@@ -200,6 +200,7 @@ def test_parameters_move_what_they_name():
     assert np.array_equal(twice.faces, plain.faces)
 
 
+@pytest.mark.long
 def test_every_parameter_matters():
     plain = sample_head(n_faces=500)
     for field in fields(HeadShape):

@@ -188,6 +188,7 @@ def test_weights_of_all_sizes_leave_single_selections(seed):
     assert found.covered_weight == pytest.approx(most, rel=1e-10)
 
 
+@pytest.mark.long
 def test_caps_of_a_ball_are_proved_where_the_relaxation_is_short():
     """Caps of 55 degrees: six are needed for 0.95 of 200 points, HiGHS agrees."""
     points, centres = lattice(200), lattice(60)

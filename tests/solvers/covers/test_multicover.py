@@ -260,6 +260,7 @@ def test_max_coverage_counts_rows_only_when_served_often_enough():
         assert answer.covered_weight == answer.upper_bound == weight
 
 
+@pytest.mark.long
 def test_permuted_rows_and_columns_need_as_many():
     rng = np.random.default_rng(0)
     problem = random_cover(5, n_e=60, n_s=24, share=0.8)

@@ -1,5 +1,7 @@
 """A body without any dominant region, all of whose surface is the target."""
 
+import pytest
+
 from planning.model.plan import RigPlan
 from planning.verify.audit.audit import audit_plan
 
@@ -8,6 +10,7 @@ _CORNERS = [(x, y, z) for x in (-50, 50) for y in (-50, 50) for z in (-0.05, 0.0
 _SIDES = "241 521 143 351 284 625 682 483 753 387 765 867"
 
 
+@pytest.mark.long
 def test_a_plate_of_a_tenth_of_a_millimetre_bears_the_audit(
     small_job, tmp_path, with_little_work
 ):
