@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .errors import PlanFileError
 
 # What numpy and zipfile raise on damaged archives, beside OSError and ValueError.
-DAMAGED = (
+_DAMAGED = (
     BadZipFile,
     EOFError,
     MemoryError,
@@ -44,5 +44,5 @@ def unpacked_arrays(content: bytes) -> dict[str, NDArray[Any]]:
             return {name: archive[name] for name in archive.files}
     except PlanFileError:
         raise
-    except (OSError, ValueError, *DAMAGED) as error:
+    except (OSError, ValueError, *_DAMAGED) as error:
         raise PlanFileError(f"not a readable .npz ({error})") from None

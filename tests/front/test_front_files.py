@@ -8,7 +8,6 @@ import pytest
 from click import UsageError
 from support.plain_shapes import box
 
-from planning import load_rig
 from planning.cli.plans.kept_fronts import taken_point
 from planning.model.errors import InputError, PlanFileError
 from planning.model.progress import Stopwatch
@@ -26,12 +25,6 @@ WISHES = Wishes(max_projectors=1, max_cameras=2, target="surface")
 def _few(with_little_work):
     with with_little_work():
         yield
-
-
-@pytest.fixture(scope="module")
-def rig():
-    few = {"n_candidate_projectors": 30, "n_candidate_cameras": 30}
-    return load_rig().replace(placement=few)
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,6 @@ import pytest
 
 from geometry.shapes.primitives import sphere
 from geometry.shapes.sample_head.sample_head import sample_head
-from planning import load_rig
 from planning.cameras import camera_cover
 from planning.model.errors import InputError
 from planning.model.progress import Stopwatch
@@ -40,12 +39,6 @@ WISHES = Wishes(max_projectors=P, max_cameras=C, **SHARES)
 def _few(with_little_work):
     with with_little_work(every_pose=True):
         yield
-
-
-@pytest.fixture(scope="module")
-def rig():
-    few = {"n_candidate_projectors": 30, "n_candidate_cameras": 30}
-    return load_rig().replace(placement=few)
 
 
 @pytest.fixture(scope="module")

@@ -26,6 +26,7 @@ from planning.cameras.camera_cover import (
 )
 from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError
+from planning.model.words import percent
 from planning.proofs.all_poses import BoundQuestion
 from planning.proofs.camera_bound import rough_bound
 from planning.proofs.selection import CandidateCover, Selection
@@ -78,8 +79,8 @@ class RouteCameras:
             )
         if not self.best_without_one:
             return ""
-        share = np.floor(1e3 * self.best_without_one) / 10.0
-        return f"with one fewer {share:.1f} % of what is reachable was measured at most"
+        share = percent(self.best_without_one, asked=1.0)
+        return f"with one fewer {share} of what is reachable was measured at most"
 
     @property
     def best(self) -> int:

@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from geometry.files.file_content import file_content
 from planning.model.devices.device_poses import moved_to
 from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.errors import InputError, PlanFileError
 from planning.model.files import reading
 from planning.model.front import Front, FrontPoint
-from planning.model.packed_arrays import DAMAGED
+from planning.model.packed_arrays import unpacked_arrays
 from planning.projectors.candidate_set import CandidateSet
 from planning.report.partial_plan import Prepared
 from planning.scene.draws import DRAWS
@@ -25,6 +26,8 @@ from planning.scene.placed_bodies import Device, existing_devices, movable
 from .front_matrix import FrontMatrix
 
 FRONT_FILE = "pareto.npz"
+# What values of a head that holds anything raise.
+_DAMAGED = ValueError, KeyError, TypeError, RecursionError
 _FORMAT, _VERSION = "ringrig-front", 2
 _ARRAYS = (
     *("stages", "seen", "projector_poses", "projector_rings", "projector_models"),
@@ -179,11 +182,11 @@ def read_front(folder: Path) -> KeptFront:
     path = folder / FRONT_FILE
     with reading(path, InputError, absent=f"; {_AGAIN}"):
         try:
-            with path.open("rb") as opened, np.load(opened) as file:
-                head = json.loads(str(file["head"]))
-                known = head["format"], head["version"]
-                kept = _whole(head, file) if known == (_FORMAT, _VERSION) else None
-        except (ValueError, KeyError, *DAMAGED) as error:
+            file = unpacked_arrays(file_content(path))
+            head = json.loads(str(file["head"]))
+            known = head["format"], head["version"]
+            kept = _whole(head, file) if known == (_FORMAT, _VERSION) else None
+        except (PlanFileError, *_DAMAGED) as error:
             what = "a field" if isinstance(error, ValidationError) else str(error)
             raise PlanFileError(
                 f"{path}: is no front, or a damaged one ({what}); {_AGAIN}"
