@@ -17,7 +17,11 @@ from numpy.typing import NDArray
 from solvers.covers.bounds.lagrangian import tighten
 from solvers.covers.bounds.mixed_integer import TOLERANCE, branch_and_bound, fits
 from solvers.covers.bounds.reduced_cover import ReducedCover
-from solvers.covers.bounds.relaxation import coverage_bounds, rounding
+from solvers.covers.bounds.relaxation import (
+    coverage_bounds,
+    rounding,
+    sets_worth_taking,
+)
 from solvers.covers.exact.floored_pairs import least_lacking
 from solvers.covers.exact.group_branching import best_by_groups
 from solvers.covers.exact.pairs import best_pair
@@ -108,29 +112,34 @@ def _of_simple(
     part = budget.part(0.2 * budget.units)
     multipliers = tighten(cover, n_sets, weight + least, cover.weights, part)
     upper = float(coverage_bounds(cover, multipliers)[n_sets])
-    if upper >= weight + least:
-        # No more is to be had than the last whole grain below the bound.
-        best = most_coverage(
-            cover,
-            best,
-            kicks,
-            target=upper - upper % cover.grain,
-            seed=seed + 1,
-            max_moves=moves(n_sets),
-        )
-        weight = cover.weight_of(best)
+    if upper < weight + least:
+        return Answer(SolveStatus.OPTIMAL, best, weight, "Lagrangian bound")
+    worth = sets_worth_taking(cover, n_sets, multipliers, weight + least)
+    some = np.union1d(best, worth)
+    few = cover.of_sets(some)
+    # No more is to be had than the last whole grain below the bound.
+    best = most_coverage(
+        few,
+        np.searchsorted(some, best),
+        kicks,
+        target=upper - upper % cover.grain,
+        seed=seed + 1,
+        max_moves=moves(n_sets),
+    )
+    best = some[best]
+    weight = cover.weight_of(best)
     if upper < weight + least:
         return Answer(SolveStatus.OPTIMAL, best, weight, "Lagrangian bound")
     search, proof = exact_search(n_sets)
     answer = search(
-        cover,
+        few,
         n_sets,
         target=weight + least,
         multipliers=multipliers,
         budget=budget.part(budget.remaining),
     )
     if answer.selected is not None:
-        best, weight = answer.selected, answer.weight
+        best, weight = some[answer.selected], answer.weight
     upper = max(weight, min(upper, answer.upper_bound))
     if answer.complete:
         return Answer(SolveStatus.OPTIMAL, best, weight, proof)

@@ -85,6 +85,20 @@ class ReducedCover:
             quota=0.0,
         )
 
+    def of_sets(self, sets: NDArray[np.int64]) -> "ReducedCover":
+        """The same rows with some of the sets, in increasing order."""
+        place = np.full(self.n_sets + 1, -1, dtype=np.int64)
+        place[sets] = np.arange(sets.size)
+        return replace(
+            self,
+            by_set=self.by_set[sets],
+            by_row=self.by_row[:, sets],
+            costs=self.costs[sets],
+            kept=self.kept[sets],
+            stand_in=place[self.stand_in],
+            kinds=self.kinds[sets],
+        )
+
     @cached_property
     def limited(self) -> bool:
         """Whether there are more sets of a kind than its stock holds."""

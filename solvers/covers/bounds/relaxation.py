@@ -46,6 +46,23 @@ def coverage_bounds(
     return np.minimum(bounds * (1.0 + rounding(clipped.size)), cover.total)
 
 
+def sets_worth_taking(
+    cover: ReducedCover, n_sets: int, multipliers: NDArray[np.float64], target: float
+) -> NDArray[np.int64]:
+    """Return the sets without which no K sets miss a target; the others are in none.
+
+    With a set, K sets cover at most sum_i (w_i - lambda_i), what it pays, and the K - 1
+    costliest: no selection that reaches the target takes a set for which that is less.
+    Multipliers are any numbers, shape (n_e,); clipped into [0, w].
+    """
+    clipped = np.clip(np.nan_to_num(multipliers), 0.0, cover.weights)
+    payments = cover.by_set @ (clipped / cover.needs)
+    others = np.partition(payments, -n_sets)[-n_sets:]
+    most = float(np.sum(cover.weights - clipped) + others.sum() - others.min())
+    slack = 1.0 + rounding(clipped.size)
+    return np.flatnonzero((most + payments) * slack >= target)
+
+
 def costliest(cover: ReducedCover, payments: NDArray[np.float64]) -> NDArray[np.int64]:
     """Return the sets by what they pay, (k,), as many of each kind as its stock has.
 

@@ -59,7 +59,8 @@ class GroupPart:
 class PartBounds:
     """Bounds parts of the selections of K sets of a simple cover.
 
-    Bounds below the target are as good as any.
+    Bounds below the target are as good as any. With `leaves_out` a part closes sets
+    that no selection of it takes that reaches the target.
 
     Attributes:
         covers: Whether set s covers row e, as 0 and 1, shape (n_s, n_e).
@@ -67,12 +68,19 @@ class PartBounds:
     """
 
     def __init__(
-        self, cover: ReducedCover, n_sets: int, target: float, budget: WorkBudget
+        self,
+        cover: ReducedCover,
+        n_sets: int,
+        target: float,
+        budget: WorkBudget,
+        *,
+        leaves_out: bool = False,
     ) -> None:
         self.covers = cover.by_set.astype(np.float32).toarray()
         self.n_sets = n_sets
         self._weights, self._total = cover.weights, cover.total
         self._target, self._budget = target, budget
+        self._leaves_out = leaves_out
         self._grid = 2.0 ** max(0.0, np.ceil(np.log2(self._total / _EXACT)))
 
     def whole(self, shares: NDArray[np.float64]) -> GroupPart:
@@ -103,7 +111,7 @@ class PartBounds:
         weights, aim = self._weights, 0.998 * self._target
         costliest = _Costliest(parts, self.n_sets)
         shares = np.stack([part.shares for part in parts]).astype(np.float64)
-        best, (bounds, taken) = shares, self._bounds(costliest, shares)
+        best, (bounds, taken, spared) = shares, self._bounds(costliest, shares)
         primal = np.stack([part.primal for part in parts]).astype(np.float64)
         fresh = np.array([not part.costliest.size for part in parts])
         primal = np.where(fresh[:, None], taken, primal)
@@ -117,19 +125,24 @@ class PartBounds:
             length = np.maximum((excess * excess * moving) @ weights, 1e-9)
             far = np.maximum(bounds - aim, 1e-4 * self._total)
             shares = np.clip(best + (step * far / length)[:, None] * excess, 0.0, 1.0)
-            values, taken = self._bounds(costliest, shares)
+            values, taken, others = self._bounds(costliest, shares)
             primal = _MEMORY * primal + (1.0 - _MEMORY) * taken
             lower = values < bounds
             best = np.where(lower[:, None], shares, best)
             bounds = np.minimum(bounds, values)
+            spared = np.where(lower[:, None], others, spared)
             stale = np.where(lower, 0, stale + 1)
             step = np.where(lower, np.minimum(1.1 * step, 4.0), step)
             step = np.where(~lower & (stale % 5 == 0), 0.6 * step, step)
             if np.all(bounds < self._target):
                 break
+        # With a set that costs less than what it takes the place of.
+        useless = bounds[:, None] - spared < self._target
+        closes = self._leaves_out
         return [
             replace(
                 part,
+                closed=part.closed | useless[i] if closes else part.closed,
                 shares=best[i].astype(np.float32),
                 primal=primal[i].astype(np.float32),
                 costliest=np.flatnonzero(taken[i]),
@@ -141,8 +154,12 @@ class PartBounds:
 
     def _bounds(
         self, costliest: "_Costliest", shares: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Bounds (p,), and which sets the costliest selections take, (p, n_s)."""
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]:
+        """Bounds (p,), which sets the costliest selections take, and what a set less.
+
+        The latter two have shape (p, n_s): by how much the bound is lower of selections
+        that take a set beside the groups.
+        """
         steps = np.floor(shares * (self._weights / self._grid))
         # Kernels of BLAS flag what they find beside short rows, now and then.
         with np.errstate(invalid="ignore"):
@@ -152,9 +169,10 @@ class PartBounds:
             + _CHOOSE * payments.size
             + 1e5
         )
-        taken = costliest.at(payments)
+        taken, spared = costliest.at(payments)
         paid = np.sum(payments, axis=1, where=taken, dtype=np.float64)
-        return self._total + self._grid * (paid - steps.sum(axis=1)), taken
+        bounds = self._total + self._grid * (paid - steps.sum(axis=1))
+        return bounds, taken, self._grid * spared
 
 
 class _Costliest:
@@ -171,10 +189,19 @@ class _Costliest:
         self._part = np.repeat(np.arange(len(parts)), n_groups)
         self._rows = np.repeat(self._part, sizes)
         self._starts, self._sizes = np.cumsum(sizes) - sizes, sizes
+        self._fixed = self._closed.copy()
+        self._fixed[self._rows, self._sets] = True
 
-    def at(self, payments: NDArray[np.float32]) -> NDArray[np.bool_]:
-        """Return which sets they take, shape (p, n_s); payments have that shape."""
+    def at(
+        self, payments: NDArray[np.float32]
+    ) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+        """Return which sets they take, and how much less is paid with any other set.
+
+        Payments and both answers have shape (p, n_s). Of sets taken, closed, or of a
+        group nothing is said: 0.
+        """
         taken = np.zeros(payments.shape, dtype=bool)
+        least = np.full(len(payments), np.inf)
         if len(self._starts):
             paid = payments[self._rows, self._sets]
             most = np.maximum.reduceat(paid, self._starts)
@@ -190,4 +217,8 @@ class _Costliest:
             costs = np.take_along_axis(some, top, axis=1)
             row, column = np.nonzero(costs > 0.0)
             taken[rows[row], top[row, column]] = True
-        return taken
+            # Where fewer are taken than are spare, any may join them.
+            full = costs.shape[1] == spare
+            least[rows] = np.maximum(costs.min(axis=1), 0.0) if full else 0.0
+        spared = np.where(self._fixed | taken, 0.0, least[:, None] - payments)
+        return taken, spared

@@ -6,6 +6,8 @@ one set, or taking one, changes next to nothing. A node is split by a *group*, t
 that are alike to one of them (by the Jaccard index of their rows): either none of it is
 taken, or at least one. Groups split further until the bound of what is left falls
 below the target. Nodes are bounded many at a time (``group_bounds``), best bound first.
+Sets that no selection of enough weight takes, by what they pay (``relaxation``), are
+left out before.
 
 References:
     Ryan and Foster, "An integer programming approach to scheduling", 1981, for
@@ -13,6 +15,7 @@ References:
 """
 
 import heapq
+from dataclasses import replace
 from itertools import count
 
 import numpy as np
@@ -20,6 +23,7 @@ from numpy.typing import NDArray
 
 from solvers.covers.answers import ExactSearch, Incumbent
 from solvers.covers.bounds.reduced_cover import ReducedCover
+from solvers.covers.bounds.relaxation import sets_worth_taking
 from solvers.covers.search.prices import Prices
 from solvers.status import WorkBudget
 
@@ -55,15 +59,27 @@ def best_by_groups(
     cover has floors that they are of, the multipliers are the priced cover's, and sets
     that miss a floor are none.
     """
-    size = cover.n_sets * cover.weights.size
-    too_large = size > _MAX_DENSE or cover.n_sets > _MAX_SETS
-    # A table of what is alike that leaves no work to use it is made for nothing.
-    too_dear = _table_units(cover) > _PREPARED * budget.remaining
-    if too_large or too_dear or n_sets >= cover.n_sets:
-        return ExactSearch(None, 0.0, cover.total, complete=False)
-    budget.spend(_table_units(cover))
     prices = Prices.even(cover) if prices is None else prices
-    return _Tree(prices, n_sets, target, budget, first=first).run(multipliers)
+    kept = sets_worth_taking(
+        prices.priced, min(n_sets, cover.n_sets), multipliers, prices.demand(target)
+    )
+    budget.spend(float(cover.by_set.nnz))
+    if kept.size <= n_sets:
+        best = Incumbent(cover, target, first=first)
+        if not cover.floored or np.all(cover.covered_by(kept) >= cover.quotas):
+            best.offer(kept, cover.weight_of(kept))
+        return ExactSearch(best.selected, best.weight, best.refuted, complete=True)
+    prices = replace(prices, cover=cover.of_sets(kept))
+    too_large = kept.size * cover.weights.size > _MAX_DENSE or kept.size > _MAX_SETS
+    # A table of what is alike that leaves no work to use it is made for nothing.
+    too_dear = _table_units(prices.cover) > _PREPARED * budget.remaining
+    if too_large or too_dear:
+        return ExactSearch(None, 0.0, cover.total, complete=False)
+    budget.spend(_table_units(prices.cover))
+    found = _Tree(prices, n_sets, target, budget, first=first).run(multipliers)
+    if found.selected is None:
+        return found
+    return replace(found, selected=kept[found.selected])
 
 
 class _Tree(Incumbent):
@@ -84,7 +100,8 @@ class _Tree(Incumbent):
         self.prices = prices
         self._names = count()
         self._open: list[tuple[float, int, GroupPart]] = []
-        self.bounds = PartBounds(prices.priced, n_sets, self._least_priced, budget)
+        least = self._least_priced
+        self.bounds = PartBounds(prices.priced, n_sets, least, budget, leaves_out=True)
         self._alike = likeness(self.bounds.covers, cover.weights)
         sets, floors = np.arange(cover.quotas.size), cover.quotas > 0
         floors &= cover.floored

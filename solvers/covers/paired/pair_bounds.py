@@ -38,6 +38,7 @@ class PairBounds(PartBounds):
         self.n_sets = n_sets
         self._weights, self._total = cover.weights, cover.total
         self._target, self._budget = target, budget
+        self._leaves_out = False
         self._grid = 2.0 ** max(0.0, np.ceil(np.log2(max(self._total, 1.0) / _EXACT)))
 
     def without(

@@ -1,6 +1,7 @@
 """Branching on groups of alike sets, against all selections of small covers."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from scipy import sparse
 from scipy.optimize import Bounds, LinearConstraint, milp
 
 from solvers.covers.bounds.reductions import reduce_problem
+from solvers.covers.bounds.relaxation import sets_worth_taking
 from solvers.covers.cover import solve_cover, solve_max_coverage
 from solvers.covers.cover_problem import CoverProblem
 from solvers.covers.exact.group_bounds import PartBounds
@@ -98,10 +100,38 @@ def test_no_selection_of_a_part_exceeds_its_bound(seed):
     assert all(np.isin(part.costliest, group).any() for group in groups)
 
 
+def test_sets_left_out_are_in_no_selection_that_reaches_the_target():
+    n_left_out, n_worth_none = 0, 0
+    for seed in range(4):
+        cover = alike_covers(seed)
+        selections = every_selection(cover, 3)
+        weights = np.array([weight_of(cover, chosen) for chosen in selections])
+        group = np.sort(np.random.default_rng(seed).permutation(cover.n_sets)[:4])
+        for target in np.quantile(weights, [0.9, 1.0]):
+            enough = np.array(selections)[weights >= target]
+            bounds = PartBounds(cover, 3, target, plenty(), leaves_out=True)
+            whole = bounds.whole(np.full(cover.weights.size, 0.5))
+            for groups in ((), (group,)):
+                (part,) = bounds.lowered([replace(whole, groups=groups)], 200)
+                of_part = enough[
+                    [all(np.isin(c, g).any() for g in groups) for c in enough]
+                ]
+                assert not part.closed[of_part].any()
+                assert not part.closed[group].any() or not groups
+                multipliers = part.shares * cover.weights
+                kept = sets_worth_taking(cover, 3, multipliers, target)
+                assert np.isin(enough, kept).all()
+                n_left_out += int(part.closed.sum())
+                n_worth_none += cover.n_sets - kept.size
+    assert n_left_out > 0
+    assert n_worth_none > 0
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_children_share_out_the_selections_of_a_part(seed):
     cover = alike_covers(seed)
-    tree = _Tree(Prices.even(cover), 3, cover.total, plenty(), first=False)
+    # No weight is too little to be of interest, so no part leaves a set out.
+    tree = _Tree(Prices.even(cover), 3, 0.0, plenty(), first=False)
     selections = every_selection(cover, 3)
 
     def held(part):
