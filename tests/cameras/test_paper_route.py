@@ -216,6 +216,7 @@ def test_half_of_the_turn_takes_half_of_the_ring():
     assert len(route.cameras.cameras) == 2
 
 
+@pytest.mark.long
 def test_what_no_camera_can_measure_ends_the_route_short():
     body = band(np.radians(5.0), n=36)
     route = paper_route(body.problem(more=1))

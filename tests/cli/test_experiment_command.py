@@ -90,6 +90,7 @@ def test_what_does_not_go_together_is_usage(arguments, sentence):
     assert sentence in found.output
 
 
+@pytest.mark.long
 def test_a_plan_is_measured_from_single_images_too():
     one = single(box_experiment(variant="fits"))
     found = reconstruct_single_shot(one, tolerance_m=1e-3, seed=3)

@@ -93,6 +93,7 @@ def test_a_table_of_100_columns_and_exit_1_where_no_point_is_enough(plan):
     assert "TAKE     none meets what is asked" in out
 
 
+@pytest.mark.long
 def test_a_point_is_planned_into_the_fronts_folder(front, plan, folder):
     code, out, _ = plan("--take", "2,2", "--no-check", "--no-report", "--no-patterns")
     assert code == 0

@@ -260,6 +260,7 @@ def test_no_cloud_stays_where_no_image_can_be_used(folder, simulated, tmp_path):
     assert list(out_folder.iterdir()) == []
 
 
+@pytest.mark.long
 def test_a_calibration_moves_devices_in_simulation_and_captures(
     folder, simulated, tmp_path
 ):
@@ -316,6 +317,7 @@ def test_errors_are_one_line_with_the_documented_code(
     assert message in " ".join(err.split())
 
 
+@pytest.mark.long
 def test_a_rig_is_refined_said_and_written_as_a_calibration(rigs, folder, simulated):
     """C2 stands 0.6 mm beside its place; one projector lights all."""
     plan = RigPlan.load(folder / "plan.json")

@@ -170,6 +170,7 @@ def shut():
     return TriangleMesh.joined([flat, TriangleMesh(moved, flat.faces), facing])
 
 
+@pytest.mark.long
 def test_a_member_that_no_light_reaches_is_left_out_before_one_that_costs(
     rig, few, shut
 ):
@@ -200,6 +201,7 @@ def _with_failed_check(plan):
     return RigPlan(plan.document.changed(reconstruction=failed), plan.surface)
 
 
+@pytest.mark.long
 def test_a_member_that_fails_its_check_is_left_out_if_enough_others_are_well(both):
     worst = both.document.family.worst
     best, members = 1 - worst, list(both.members)

@@ -83,6 +83,7 @@ def test_every_number_is_there_and_more_devices_measure_no_less(kept):
     assert front.points[-1].measured_m2 > 1.2 * front.points[0].measured_m2
 
 
+@pytest.mark.long
 def test_no_pair_of_candidates_measures_more_than_the_bound_of_one_and_one(
     kept, mesh, rig
 ):

@@ -63,6 +63,7 @@ def test_count_and_bounds_are_told_and_what_is_asked_is_measured(plan):
     assert target.lit_m2 >= 0.9 * target.reachable_by_projectors_m2
 
 
+@pytest.mark.long
 def test_no_more_are_needed_than_meet_all_that_is_asked(few, monkeypatch):
     """Candidates alone would take two more; those planned were moved."""
 
@@ -208,6 +209,7 @@ def test_too_few_heads_measure_what_they_can_and_say_how_many_would(few):
     assert count.lower_bound > 1
 
 
+@pytest.mark.long
 def test_heads_that_reach_too_little_say_which_limit_would_give_more(few):
     """Pixels are 0.5 mm apart at 600 mm, more where the light meets at an angle."""
     limits = {"max_sigma_mm": 1.0, "max_sample_distance_mm": 0.52}

@@ -173,6 +173,7 @@ def facing_plates(gap):
 
 
 @pytest.mark.parametrize(("share", "count"), [(0.95, 4)])
+@pytest.mark.long
 def test_facing_plates_are_lit_through_the_gap_from_four_sides(share, count):
     """Plates of side w = 100 mm, g = 40 mm apart, lit on their inner sides.
 

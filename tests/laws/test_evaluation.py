@@ -156,6 +156,7 @@ def test_another_mesh_is_measured_by_the_same_rings(
     assert audit_plan(seen, n_samples=4000).failures == ()
 
 
+@pytest.mark.long
 def test_devices_that_are_kept_count_and_keep_their_names(
     folder, plate, planned, with_little_work
 ):

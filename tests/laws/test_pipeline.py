@@ -253,6 +253,7 @@ def test_summary_names_devices_counts_and_denominators(plan):
 
 
 @pytest.mark.usefixtures("little_work")
+@pytest.mark.long
 def test_a_small_workspace_does_not_pass_by_a_shrinking_denominator(tmp_path):
     path = tmp_path / "frontal.toml"
     path.write_text(
@@ -384,6 +385,7 @@ def test_a_plate_without_curvature_has_no_dominant_region():
         plan_rig(plate, load_rig("default"), max_projectors=3)
 
 
+@pytest.mark.long
 def test_impossible_accuracy_is_named_as_the_limit_that_forbids(quick):
     with pytest.raises(InfeasibleLimitsError, match=r"sigma 100 %.*--accuracy"):
         quick(accuracy_mm=1e-9)

@@ -130,6 +130,7 @@ def test_without_a_limit_nothing_ticks():
     assert clock.remaining is None
 
 
+@pytest.mark.long
 def test_nobody_waits_for_work_that_was_cut():
     begin = time.monotonic()
 

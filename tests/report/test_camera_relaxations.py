@@ -435,6 +435,7 @@ def test_an_accuracy_that_no_pose_reaches_exits_4_and_says_which_would_do(
 
 
 @pytest.mark.usefixtures("little_work")
+@pytest.mark.long
 def test_a_depth_of_field_that_holds_half_is_told_by_cause_and_audited(
     small_job, tmp_path, monkeypatch
 ):

@@ -1,5 +1,6 @@
 """Advice names the obstacle that is in the way."""
 
+import pytest
 from support.factories import EXACT
 from support.plain_shapes import box as plate_of
 
@@ -17,6 +18,7 @@ FEW = EXACT + (
 )
 
 
+@pytest.mark.long
 def test_where_too_little_can_be_lit_the_obstacle_in_the_way_is_named(
     tmp_path, with_little_work
 ):

@@ -95,6 +95,7 @@ def test_a_ball_wider_than_the_beam_is_served_by_several():
 
 
 @pytest.mark.usefixtures("little_work")
+@pytest.mark.long
 def test_too_few_beams_for_a_plate_say_how_many_or_how_wide_they_must_be(
     small_job, tmp_path, monkeypatch
 ):

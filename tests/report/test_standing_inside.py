@@ -51,6 +51,7 @@ max_mm = [150.0, 150.0, 150.0]
 """
 
 
+@pytest.mark.long
 def test_a_workspace_inside_the_object_is_refused_with_what_would_fit(
     small_job, tmp_path, monkeypatch, with_little_work
 ):

@@ -292,6 +292,7 @@ def test_auto_takes_centred_axes_where_they_cost_no_camera(ball):
     assert min(apart) > 0.01
 
 
+@pytest.mark.long
 def test_centred_axes_are_planned_whole_only_where_they_may_be_taken(ball, monkeypatch):
     """Free ones that save a camera end it; as many are held against centred ones.
 

@@ -389,6 +389,7 @@ def test_exit_codes_and_one_line_errors(
 
 
 @pytest.mark.usefixtures("little_work")
+@pytest.mark.long
 def test_a_weight_on_the_command_line_ends_in_a_verified_plan(
     folder, tmp_path, monkeypatch, capsys
 ) -> None:

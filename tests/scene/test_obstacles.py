@@ -299,6 +299,7 @@ def test_housings_and_obstacles_are_told_apart(rig_of, with_little_work):
     assert audit_plan(plan, n_samples=3000).failures == ()
 
 
+@pytest.mark.long
 def test_what_they_cost_is_told_by_name(planned, rig_of, with_little_work):
     coverage = planned.coverage
     assert set(coverage.blocked_by_obstacle_m2) == {"robot", "pole", "bench"}

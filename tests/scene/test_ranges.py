@@ -406,6 +406,7 @@ def plan(body, with_little_work, tmp_path_factory):
     return made
 
 
+@pytest.mark.long
 def test_the_plan_carries_points_sphere_and_guard(plan, body):
     entry = plan.to_document()["ranges"]
     assert len(entry["observations"]) == 42
@@ -423,6 +424,7 @@ def test_the_plan_carries_points_sphere_and_guard(plan, body):
     assert f"{len(rows)} of {len(rows)} rows" in text
 
 
+@pytest.mark.long
 def test_rows_keep_two_sigma_of_d_max(plan, body):
     """Against d_max of spheres drawn from the estimate's own covariance."""
     rng = np.random.default_rng(0)
@@ -442,6 +444,7 @@ def test_rows_keep_two_sigma_of_d_max(plan, body):
         assert row.d_max_sigma == pytest.approx(np.std(drawn), rel=0.1)
 
 
+@pytest.mark.long
 def test_d_max_of_a_row_is_that_of_the_incidence_as_stated(plan, body):
     row = plan.document.baselines[0]
     _, guard = guarded(load_rig("default"), body)
@@ -472,6 +475,7 @@ def _case(plan):
     return examine(plan, seed=0, n_samples=100, threads=1)
 
 
+@pytest.mark.long
 def test_the_audit_finds_nothing_in_a_true_plan(plan):
     assert audited(plan, plan.to_document()) == ()
 
@@ -510,6 +514,7 @@ SPOILED = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("what", SPOILED)
 def test_the_audit_finds_each_false_claim(plan, what):
     document = plan.to_document()
@@ -519,6 +524,7 @@ def test_the_audit_finds_each_false_claim(plan, what):
     assert any(name in failure for failure in failures), failures
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "value"),
     [("d_max_stated", 1.9), ("d_max_sigma", 1e-3), ("covered_at_2_sigma", False)],
@@ -530,6 +536,7 @@ def test_the_audit_finds_false_rows(plan, name, value):
     assert any(name in failure for failure in failures), failures
 
 
+@pytest.mark.long
 def test_the_audit_finds_a_surface_that_is_not_the_sphere(plan):
     mesh = plan.surface.mesh
     grown = replace(mesh, vertices=mesh.vertices * 1.0001)
@@ -538,6 +545,7 @@ def test_the_audit_finds_a_surface_that_is_not_the_sphere(plan):
     assert any("surface.npz" in failure for failure in failures)
 
 
+@pytest.mark.long
 def test_a_plan_of_a_mesh_has_no_such_claims(plan):
     document = {k: v for k, v in plan.to_document().items() if k != "ranges"}
     assert audited(plan, document) == ()

@@ -141,6 +141,7 @@ def test_a_post_elsewhere_than_the_rig_has_it_is_found(among, handmade, where, t
     assert any(told in failure for failure in failures)
 
 
+@pytest.mark.long
 def test_a_post_that_the_plan_forgot_shows_in_its_areas(among):
     """The audit's own rays meet it: areas claimed without it are false."""
     failures = audit_plan(_wider_at_first(among), n_samples=5000).failures

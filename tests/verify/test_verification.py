@@ -84,6 +84,7 @@ def test_a_false_confusion_table_is_named(handmade, verified):
     ]
 
 
+@pytest.mark.long
 def test_recorded_figures_are_held_against_a_run_with_other_noise(handmade, verified):
     figures = verified[0].reconstruction.to_document()
     plan = handmade.tampered(
@@ -342,6 +343,7 @@ def test_the_files_alone_are_enough_and_the_mesh_may_be_given(handmade, tmp_path
     assert [f for f in found.failures if "isn't that of surface.npz" in f]
 
 
+@pytest.mark.long
 def test_another_object_is_named_by_its_mesh_and_by_the_pixels(handmade):
     plan = handmade.build_plan()
     mesh = plan.surface.mesh

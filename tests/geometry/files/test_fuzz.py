@@ -58,6 +58,7 @@ def test_a_cut_anywhere_is_refused_by_every_format_that_counts(
                 load_mesh(path)
 
 
+@pytest.mark.long
 def test_the_worker_is_restarted_when_it_dies_or_hangs(
     fuzzing, tmp_path, monkeypatch
 ) -> None:

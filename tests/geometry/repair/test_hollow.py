@@ -163,6 +163,7 @@ def faces_inside(caster: RayCaster) -> np.ndarray:
 
 # A sphere's inside sees its mouth alike from everywhere: (1 - cos mouth)/2, which is
 # 0.043, 0.289 and 0.413; a third is the limit.
+@pytest.mark.long
 def test_the_inside_of_a_ball_with_a_mouth_is_all_or_nothing() -> None:
     for name in ("narrow mouth", "wide mouth"):
         mesh, shell = shell_of(name)

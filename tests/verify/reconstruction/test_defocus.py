@@ -97,6 +97,7 @@ def test_edges_off_the_plane_in_focus_are_as_wide_as_the_disc_makes_them(rigs, f
     assert np.abs(blurred - frames(CLEAN, None)).max() > 10.0
 
 
+@pytest.mark.long
 def test_the_check_focuses_what_really_stands_there(rigs):
     ball = rigs.bumpy_sphere(0.05, subdivisions=4)
     plan = rigs.small_rig(ball)

@@ -91,6 +91,7 @@ def test_a_plane_comes_out_flat_and_where_it_is(captured, tmp_path):
     assert "calibration is of another" not in ended.output
 
 
+@pytest.mark.long
 def test_white_and_black_may_come_first(captured, tmp_path):
     folder, calibration, *_ = captured
     other = tmp_path / "first"

@@ -74,6 +74,7 @@ def test_a_device_that_was_to_measure_nothing_is_not_called_dark(plan, promised)
     )
 
 
+@pytest.mark.long
 def test_two_projectors_on_at_once_are_named(plan, claims):
     apart = Scanner.of(plan)
     together = replace(apart, groups=(frozenset({"P1", "P2"}),))
@@ -106,6 +107,7 @@ def test_pixels_that_saturate_hide_no_fault_and_are_told_where_there_is_none(
     assert said_once(saturates, failures(plan, everywhere))
 
 
+@pytest.mark.long
 def test_a_root_disc_of_another_camera_is_named(plan, claims, monkeypatch):
     draw = ProjectorCalibration.pattern_for
 
@@ -212,6 +214,7 @@ def test_a_hidden_region_is_named_with_its_share(plan, claims):
     )
 
 
+@pytest.mark.long
 def test_where_no_light_falls_is_said(plan, claims):
     samples = claims["samples"]
     back = {"samples": samples, "predicted": samples.normals[:, 1] > 0.8}
@@ -220,6 +223,7 @@ def test_where_no_light_falls_is_said(plan, claims):
     assert said_once("no projector's light falls on most of them", found), found
 
 
+@pytest.mark.long
 def test_surface_met_at_grazing_incidence_is_said(plan, claims):
     """Between 80 and 88 degrees from the nearest projector, but within its beam."""
     samples = claims["samples"]

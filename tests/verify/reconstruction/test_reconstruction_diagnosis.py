@@ -110,6 +110,7 @@ def test_one_change_is_named_alone(plan, change, words):
     assert re.search(words, sentence), sentence
 
 
+@pytest.mark.long
 def test_a_projectors_zoom_and_a_step_towards_the_object_are_told_or_both_named(
     diverging,
 ):
@@ -122,6 +123,7 @@ def test_a_projectors_zoom_and_a_step_towards_the_object_are_told_or_both_named(
     assert re.search(r"P1 looks as if it stood (29|30|31) mm from its place", stepped)
 
 
+@pytest.mark.long
 def test_a_turn_about_the_rings_axis_is_left_out_of_what_is_said(diverging):
     """It leaves no trace; the other part of the turn does."""
 
@@ -145,6 +147,7 @@ def turned_about(axis: np.ndarray, degrees: float) -> np.ndarray:
     return np.eye(3) + s * cross + (1 - c) * cross @ cross
 
 
+@pytest.mark.long
 def test_a_projector_far_from_its_place_is_found_and_its_light_called_grazing(
     rigs, diverging
 ):
@@ -168,6 +171,7 @@ def test_two_faults_are_named_one_by_one(diverging):
     assert re.search("C3 looks as if its focal length were 2 % longer", text), text
 
 
+@pytest.mark.long
 def test_the_objects_size_and_place(plan):
     mesh = plan.surface.mesh
     scale = 1.01 if plan.projectors[0].light == "diverging" else 0.98

@@ -96,6 +96,7 @@ def test_points_name_both_cameras_and_lie_on_both_rays(result, scanner):
         np.testing.assert_allclose(along, cloud.beams[other], atol=1e-12)
 
 
+@pytest.mark.long
 def test_the_same_seed_gives_the_same_points_whatever_the_threads(scanner):
     few = replace(scanner, cameras=scanner.cameras[:2])
     one, two = (reconstruct_views(few, BALL, seed=1, threads=n) for n in (1, 2))

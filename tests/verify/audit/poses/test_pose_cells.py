@@ -177,6 +177,7 @@ def test_no_place_lights_what_its_cell_lacks(name) -> None:
 
 
 @pytest.mark.parametrize("name", _SHAPES)
+@pytest.mark.long
 def test_no_direction_lights_what_its_cell_lacks(name) -> None:
     _, _, samples, space = _shape(name)
     towards, centre = _directions(600), np.array(space.centre)
