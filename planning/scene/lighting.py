@@ -133,15 +133,6 @@ def _mark_blocked(
     first[lit] = first_blocked(bodies, projector, points[lit], limits, LIT)
 
 
-def shows_back(projector: PlannedProjector, target: Target) -> NDArray[np.bool_]:
-    """Return which samples surely show light their back, shape (n,).
-
-    Beyond every limit of incidence, so that `first_failure` is at most `INCIDENCE`.
-    """
-    samples, pose = target.samples, projector.world_from_device
-    return light_of(projector.device).shows_back(pose, samples.points, samples.normals)
-
-
 def margins(light: LightOnSamples, limits: ProjectorLimits) -> NDArray[np.float64]:
     """Return min(theta_max - incidence, tangent angle - tau_min) in [rad], shape (n,).
 

@@ -60,12 +60,6 @@ class DivergingLight:
     def common_direction(self, poses: _Array) -> None:
         """Return None: L depends on the point."""
 
-    def shows_back(self, pose: _Array, points: _Array, normals: _Array) -> _Mask:
-        """Return which samples show light their back, N.(P - Q) > 0 surely."""
-        offsets = points - pose[:3, 3]
-        behind = np.einsum("ij,ij->i", normals, offsets)
-        return behind > 3e-9 * np.abs(offsets).max(initial=0.0)
-
     def within_ring(self, local: _Array, ring: float) -> _Mask:
         """Return which columns of the ring frame, (3, n), lie in the cone R <= ring."""
         x, y, z = local
@@ -198,10 +192,6 @@ class ParallelLight:
     def common_direction(self, poses: _Array) -> _Array:
         """Return L of poses (..., 4, 4), the same at every point, (..., 3)."""
         return poses[..., :3, 2]
-
-    def shows_back(self, pose: _Array, points: _Array, normals: _Array) -> _Mask:
-        """Return which samples show light their back, N.L > 0 surely."""
-        return normals @ pose[:3, 2] > 1e-9
 
     def within_ring(self, local: _Array, ring: float) -> _Mask:
         """Return which columns of the ring frame lie in the cylinder R <= ring."""

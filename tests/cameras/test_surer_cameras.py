@@ -50,6 +50,7 @@ def errors(plan, case):
     return PairErrors.of(limits, plan.projectors, samples, views)
 
 
+@pytest.mark.long
 def test_each_error_does_what_a_rig_does_that_is_off_by_it(plan, case, errors):
     best = errors.sigma.argmin(axis=1)
     at = errors.place[np.arange(len(best)), best]

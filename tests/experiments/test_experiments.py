@@ -339,6 +339,7 @@ def test_errors_are_summarised_by_hand():
     assert Errors.of(np.zeros(0)) == Errors(0)
 
 
+@pytest.mark.long
 def test_a_second_sequence_doubles_the_density(of_box):
     """Between flat rings there is one each; the edge bends most about the centre."""
     shifted = second_sequence(of_box.experiment.scanner, of_box.union.cloud)
@@ -362,6 +363,7 @@ def test_a_second_sequence_doubles_the_density(of_box):
     np.testing.assert_allclose(radius, every[own.ring], atol=1e-9)
 
 
+@pytest.mark.long
 def test_distortion_and_ambient_light_are_switches(of_box):
     """A lens that is known costs nothing, one that isn't costs accuracy."""
     bent = box_experiment(variant="fits", distortion=-0.2)
@@ -376,6 +378,7 @@ def test_distortion_and_ambient_light_are_switches(of_box):
     assert 1.3 * dark < lit < 5.0 * dark
 
 
+@pytest.mark.long
 def test_single_images_are_labelled_by_a_prior_that_is_roughly_right(of_face):
     experiment = of_face.experiment
     prior = prior_mesh(experiment.mesh, 6e-3)
@@ -406,6 +409,7 @@ def test_single_images_are_labelled_by_a_prior_that_is_roughly_right(of_face):
     assert Errors.of(far).outliers < 0.6 * of_face.clouds[0].errors.outliers
 
 
+@pytest.mark.long
 def test_an_experiment_of_single_images_says_so():
     experiment = box_experiment(variant="fits")
     shot = run_experiment(experiment, photometry=SOFT, tolerance_m=2e-3)

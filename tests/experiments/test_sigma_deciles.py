@@ -44,6 +44,7 @@ def test_the_law_of_planning_leaves_out_what_blur_does_and_stays_safe(found):
     assert np.all(ball.deciles("plain", 0.1) < 0.25)
 
 
+@pytest.mark.long
 def test_pitch_is_the_distance_of_rings_in_the_image(found):
     for errors in found:
         ratio = errors.seen_pitch / errors.pitch

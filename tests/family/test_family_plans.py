@@ -382,6 +382,7 @@ def test_rings_are_spaced_for_those_served_and_may_be_wide_on_others(wide):
     ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", FALSE)
 def test_what_is_false_of_a_family_is_found(both, name):
     change, words = FALSE[name]

@@ -183,6 +183,7 @@ def cleared(key, value):
     return told(lambda document: document.update({key: value}))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("lie", "where"),
     [

@@ -104,6 +104,7 @@ def test_box_takes_two_diagonals_three_edges_or_six_normals(incidence, count):
     assert (found.count, found.least) == (count, count)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("share", "count"), [(0.66, 3)])
 def test_sphere_takes_as_many_as_its_caps_hold(share, count):
     """A cap of theta holds (1 - cos theta)/2 of a sphere: a quarter at 60 degrees.
@@ -115,6 +116,7 @@ def test_sphere_takes_as_many_as_its_caps_hold(share, count):
     assert (found.count, found.least) == (count, count)
 
 
+@pytest.mark.long
 def test_sphere_in_diverging_light_takes_caps_that_are_smaller():
     """At distance D the cap is theta - asin(R/D sin theta), largest at the far end."""
     ball = sphere(0.08, subdivisions=4)

@@ -95,6 +95,7 @@ def test_moves_that_fresh_samples_deny_are_undone(shaded, monkeypatch):
     assert widen_margins(scene, stage) != chosen
 
 
+@pytest.mark.long
 def test_moves_reach_no_more_than_what_was_proved_is_a_share_of():
     """Parallel light from a cone of 40 degrees: turned beams would reach round a ball.
 

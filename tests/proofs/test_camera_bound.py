@@ -157,6 +157,7 @@ def shown(mesh, device, limits):
     return scene, projectors, rows
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("mesh", "name"),
     [
@@ -438,6 +439,7 @@ def test_a_lens_model_that_never_leaves_the_image_bounds_nothing():
 # ---- counts of closed form
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("degrees", [70.0, 50.0, 40.0])
 def test_a_ring_of_cameras_about_a_cylinder_is_that_of_the_closed_form(degrees):
     """eta = theta - asin(rho/S sin theta), n_min = floor(pi / eta) + 1."""

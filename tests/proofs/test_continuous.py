@@ -132,6 +132,7 @@ def position_holder(tree, offset):
     return inside
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "light", "tangent_deg"),
     [
@@ -294,6 +295,7 @@ def test_rooms_planes_and_keep_out_volumes_empty_cells_and_only_theirs(light):
         assert not unpack_rows(bits, 200).any()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("shape", "share", "count"),
     [

@@ -508,6 +508,7 @@ def test_what_cannot_be_drawn_is_refused(plan):
         draw_rig(plan, face_status=np.full(n, 4, dtype=np.int8))
 
 
+@pytest.mark.long
 def test_a_large_mesh_is_drawn_in_seconds(plan):
     large = sample_head(n_faces=40_000)
     begin = time.process_time()

@@ -175,6 +175,7 @@ def shining(name, towards, aside=0.0):
     return Existing(name, "projector", tuple(tuple(row) for row in pose.tolist()))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("existing", "count", "idle"),
     [
@@ -298,6 +299,7 @@ def test_they_stay_are_marked_and_the_audit_agrees(planned):
     assert "existing: old camera" in text
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [

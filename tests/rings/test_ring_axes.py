@@ -54,6 +54,7 @@ def test_a_ball_needs_as_many_projectors_as_its_caps_do(stages):
     assert len(cameras.cameras) >= 2
 
 
+@pytest.mark.long
 def test_widest_gap_is_that_of_the_farthest_lit_sample(stages):
     made, projectors, _ = stages
     target = made.target_samples(Draw(3000, 8))

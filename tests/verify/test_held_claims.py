@@ -79,6 +79,7 @@ def test_claims_come_out_again_to_the_last_digit(plan):
     assert f"claims held {EXACTLY}" in honest.summary()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("place", "key"),
     [
@@ -244,6 +245,7 @@ def test_steep_directions_are_those_that_come_out_of_the_mesh(plan):
     assert "surface.sha256" in named
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("place", "value", "named"),
     [

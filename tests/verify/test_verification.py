@@ -320,6 +320,7 @@ def test_a_false_claim_fails_without_the_pixels(handmade):
     assert "FALSE: C1.seen_area_m2: claimed 0.1 m²" in found.summary()
 
 
+@pytest.mark.long
 def test_a_mounted_rig_that_differs_from_the_plan_fails(handmade):
     plan = handmade.build_plan()
 

@@ -2,22 +2,21 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby, islice
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.rays.rays import equal_parts
 from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.scene import lighting
-from planning.scene.limits.projector_limits import INCIDENCE, LIT
+from planning.scene.limits.projector_limits import LIT
 from planning.scene.measuring.measured import LitSamples, measured_by, taken
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
-# Dark samples that a thread takes on together.
-_TOGETHER = 4000
-# Cameras that are asked together for what all before them missed.
+# Devices that are asked together for what all before them missed.
 _MOST_AT_ONCE = 64
+_Device = TypeVar("_Device")
 
 
 def furthest_lit(
@@ -35,26 +34,14 @@ def furthest_lit(
 def _furthest_lit(
     scene: Scene, projectors: Sequence[PlannedProjector], target: Target
 ) -> NDArray[np.int8]:
-    furthest, limits = np.zeros(len(target), np.int8), scene.requirements.projector
-
-    def search(part: slice) -> None:
-        for projector in projectors:
-            scene.check_cancelled()
-            pending = part.start + np.flatnonzero(furthest[part] < LIT)
-            if not len(pending):
-                break
-            dark = target.take(pending)
-            # What shows its back comes no further than it did before.
-            idle = furthest[pending] >= INCIDENCE
-            idle &= lighting.shows_back(projector, dark)
-            pending, dark = pending[~idle], dark.take(~idle)
-            stage = lighting.first_failure(
-                projector, dark, limits, scene.occlusion, bodies=scene.bodies
-            )
-            furthest[pending] = np.maximum(furthest[pending], stage)
-
-    # Each sample is looked at by itself: no result depends on the parts.
-    scene.occlusion.share(search, equal_parts(len(target), _TOGETHER))
+    furthest = np.zeros(len(target), np.int8)
+    for few in _ever_more(projectors):
+        scene.check_cancelled()
+        pending = np.flatnonzero(furthest < LIT)
+        if not len(pending):
+            break
+        stages = lighting.lit_stages(scene, few, target.take(pending))
+        furthest[pending] = np.maximum(furthest[pending], stages.max(axis=1))
     return furthest
 
 
@@ -90,9 +77,15 @@ def measured_by_any(
 def _batches(
     cameras: Iterable[PlannedCamera],
 ) -> Iterator[tuple[str, Sequence[PlannedCamera]]]:
-    """Yield stations with cameras there, ever more at once: the first leave little."""
+    """Yield stations with some of the cameras there."""
     for station, group in groupby(cameras, key=lambda camera: camera.station):
-        size = 1
-        while few := tuple(islice(group, size)):
+        for few in _ever_more(group):
             yield station, few
-            size = min(2 * size, _MOST_AT_ONCE)
+
+
+def _ever_more(devices: Iterable[_Device]) -> Iterator[Sequence[_Device]]:
+    """Yield ever more devices at once: the first leave little."""
+    left, size = iter(devices), 1
+    while few := tuple(islice(left, size)):
+        yield few
+        size = min(2 * size, _MOST_AT_ONCE)

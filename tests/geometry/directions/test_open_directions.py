@@ -65,6 +65,7 @@ MESHES = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", MESHES)
 @pytest.mark.parametrize("n", [8, 48])
 def test_what_passes_is_in_an_open_cell(name, n):

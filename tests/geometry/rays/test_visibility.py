@@ -173,6 +173,7 @@ def test_a_matrix_in_parallel_light_is_its_rows():
         np.testing.assert_array_equal(matrix[row], facing & ~blocked)
 
 
+@pytest.mark.long
 def test_a_large_matrix_takes_a_byte_a_pair():
     mesh = sphere(0.1, subdivisions=2)
     samples = sample_surface(mesh, 300_000, seed=0)

@@ -515,6 +515,7 @@ def test_the_sphere_needs_a_tetrahedron(cap_trees, degrees, too_few, truth):
     assert "multisets of 3 cells" in answer.proof
 
 
+@pytest.mark.long
 def test_just_below_the_tetrahedron_four_caps_fail(cap_trees):
     points = cap_trees.spread(600)
     assert 63.4349 < 63.5 < 63.5 + hole(points) / DEG < 70.5288
@@ -539,6 +540,7 @@ SOLIDS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("count", [4, 6, 12])
 def test_no_bound_beats_a_platonic_cover(cap_trees, count):
     radius, axes = SOLIDS[count]

@@ -119,6 +119,7 @@ def parallel_program(normals, **changes):
     return PoseProgram(**(arguments | changes))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", range(5))
 def test_pose_program_is_globally_optimal_and_ipopt_does_no_better(seed):
     normals = cap(seed, 300, 0.5 + 0.08 * seed, axis=[0.2, -1.0, 0.3])
@@ -188,6 +189,7 @@ def test_bad_arrays_are_refused(arguments, message):
         max_margin_direction(*arguments)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("module", ["cvxpy", "casadi"])
 def test_neither_cvxpy_nor_casadi_is_imported_before_it_is_used(module):
     code = (

@@ -100,6 +100,7 @@ def found(told, handmade, change=lambda document: None):
     return findings.failures
 
 
+@pytest.mark.long
 def test_what_the_slow_loop_finds_left_is_true(told, handmade):
     assert found(told, handmade) == ()
 

@@ -21,6 +21,7 @@ def _depth(turning, still, point=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0)):
     return depth_of_turn(turning, still, np.array(point), np.array(axis))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("axis", _AXES)
 def test_a_ball_that_turns_meets_one_in_its_ring_and_none_beside_it(axis):
     point, axis = np.array([0.3, -0.2, 0.1]), np.array(axis)

@@ -99,6 +99,7 @@ def test_what_was_measured_replaces_the_plan_and_the_rest_stays(rigs, plan, tmp_
     assert plan.cameras[0].device.camera_matrix[0, 0] == 1600.0
 
 
+@pytest.mark.long
 def test_a_rig_that_was_mounted_and_calibrated_measures_as_planned(
     rigs, plan, expected, tmp_path
 ):

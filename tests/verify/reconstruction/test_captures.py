@@ -200,6 +200,7 @@ def test_white_and_black_exchanged(job):
     assert_left_out(found, "P1 with C1", "white is darker than black")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("p", [0, 1])
 def test_a_bit_or_root_disc_exchanged_with_its_inverse(job, p):
     for bit in range(job.n_bits(p) + 1):

@@ -110,6 +110,7 @@ def test_nothing_depends_on_threads(result, scanner, expected):
     assert again.failures == result.failures
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("device", "kind"), [("P1", "turn"), ("C2", "shift")])
 def test_a_wrong_pose_fails_and_is_named(scanner, expected, device, kind):
     error = np.eye(4)

@@ -127,6 +127,7 @@ def test_merged_points_are_better_than_either_projectors(check, ball):
     assert check.accuracy.p95_m < 0.75 * np.percentile(np.abs(away), 95.0)
 
 
+@pytest.mark.long
 def test_the_result_does_not_depend_on_threads(rigs, plan, samples, check):
     predicted = rigs.predict_on_sphere(plan, samples)
     options = {"samples": samples, "predicted": predicted}
@@ -136,6 +137,7 @@ def test_the_result_does_not_depend_on_threads(rigs, plan, samples, check):
     assert np.array_equal(one.merged.sigma, two.merged.sigma, equal_nan=True)
 
 
+@pytest.mark.long
 def test_another_seed_is_another_noise(plan, check):
     other = reconstruct_plan(plan, seed=1)
     assert other.to_document() != check.to_document()
@@ -189,6 +191,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_rig_that_is_not_the_plan_fails(rigs, one_light, samples, fault):
     change, cause = FAULTS[fault]

@@ -188,6 +188,7 @@ def test_no_direction_lights_what_its_cell_lacks(name) -> None:
     assert _lacking(cells, made, _lit(device, name, poses)) == 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", _SHAPES)
 def test_skies_close_most_of_what_is_blocked(name) -> None:
     # Open maps would be a superset, too: of what small cells hold most is lit.
@@ -211,6 +212,7 @@ def test_skies_close_most_of_what_is_blocked(name) -> None:
     assert still.sum() < 0.4 * in_shadow.sum()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", _SHAPES)
 def test_no_direction_of_a_pixel_that_is_closed_is_lit(name) -> None:
     # Without the slack that cells have: so outlines may miss no pixel.

@@ -158,6 +158,7 @@ def test_what_existing_devices_cover_is_free(handmade, case) -> None:
     assert bounds["projector"].line.endswith("proved: so many stand already")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", _KINDS)
 def test_forged_ones_are_never_called_proved(case, kind) -> None:
     # The plan's own devices are two of a kind; reference poses with them cover all.

@@ -66,6 +66,7 @@ def test_what_lies_apart_takes_a_cap_each() -> None:
     assert not _by_multipliers(points, 55.0, 3, lam).too_few
 
 
+@pytest.mark.long
 def test_pairs_refute_what_two_caps_leave() -> None:
     points = _points(300)
     gap = Question.by_pairs
