@@ -59,6 +59,9 @@ def best_by_groups(
     cover has floors that they are of, the multipliers are the priced cover's, and sets
     that miss a floor are none.
     """
+    # A table of what is alike that leaves no work to use it is made for nothing.
+    if _table_units(cover) > _PREPARED * budget.remaining:
+        return ExactSearch(None, 0.0, cover.total, complete=False)
     prices = Prices.even(cover) if prices is None else prices
     kept = sets_worth_taking(
         prices.priced, min(n_sets, cover.n_sets), multipliers, prices.demand(target)
@@ -69,12 +72,9 @@ def best_by_groups(
         if not cover.floored or np.all(cover.covered_by(kept) >= cover.quotas):
             best.offer(kept, cover.weight_of(kept))
         return ExactSearch(best.selected, best.weight, best.refuted, complete=True)
-    prices = replace(prices, cover=cover.of_sets(kept))
-    too_large = kept.size * cover.weights.size > _MAX_DENSE or kept.size > _MAX_SETS
-    # A table of what is alike that leaves no work to use it is made for nothing.
-    too_dear = _table_units(prices.cover) > _PREPARED * budget.remaining
-    if too_large or too_dear:
+    if kept.size * cover.weights.size > _MAX_DENSE or kept.size > _MAX_SETS:
         return ExactSearch(None, 0.0, cover.total, complete=False)
+    prices = replace(prices, cover=cover.of_sets(kept))
     budget.spend(_table_units(prices.cover))
     found = _Tree(prices, n_sets, target, budget, first=first).run(multipliers)
     if found.selected is None:
