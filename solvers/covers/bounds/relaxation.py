@@ -49,16 +49,16 @@ def coverage_bounds(
 def sets_worth_taking(
     cover: ReducedCover, n_sets: int, multipliers: NDArray[np.float64], target: float
 ) -> NDArray[np.int64]:
-    """Return the sets without which no K sets miss a target; the others are in none.
+    """Return the sets that K sets which cover a target's weight may be among.
 
-    With a set, K sets cover at most sum_i (w_i - lambda_i), what it pays, and the K - 1
-    costliest: no selection that reaches the target takes a set for which that is less.
+    With a set, K sets cover at most sum_i (w_i - lambda_i), what it pays, and what the
+    K - 1 costliest do: where that is less, no such selection takes it.
     Multipliers are any numbers, shape (n_e,); clipped into [0, w].
     """
     clipped = np.clip(np.nan_to_num(multipliers), 0.0, cover.weights)
     payments = cover.by_set @ (clipped / cover.needs)
-    others = np.partition(payments, -n_sets)[-n_sets:]
-    most = float(np.sum(cover.weights - clipped) + others.sum() - others.min())
+    costliest_others = np.sort(payments)[payments.size - n_sets + 1 :]
+    most = float(np.sum(cover.weights - clipped) + costliest_others.sum())
     slack = 1.0 + rounding(clipped.size)
     return np.flatnonzero((most + payments) * slack >= target)
 

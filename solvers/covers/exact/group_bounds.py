@@ -60,7 +60,7 @@ class PartBounds:
     """Bounds parts of the selections of K sets of a simple cover.
 
     Bounds below the target are as good as any. With `leaves_out` a part closes sets
-    that no selection of it takes that reaches the target.
+    that none of its selections takes which reach the target.
 
     Attributes:
         covers: Whether set s covers row e, as 0 and 1, shape (n_s, n_e).
@@ -136,13 +136,14 @@ class PartBounds:
             step = np.where(~lower & (stale % 5 == 0), 0.6 * step, step)
             if np.all(bounds < self._target):
                 break
-        # With a set that costs less than what it takes the place of.
-        useless = bounds[:, None] - spared < self._target
-        closes = self._leaves_out
+        closed = [part.closed for part in parts]
+        if self._leaves_out:
+            useless = bounds[:, None] - spared < self._target
+            closed = [a | b for a, b in zip(closed, useless, strict=True)]
         return [
             replace(
                 part,
-                closed=part.closed | useless[i] if closes else part.closed,
+                closed=closed[i],
                 shares=best[i].astype(np.float32),
                 primal=primal[i].astype(np.float32),
                 costliest=np.flatnonzero(taken[i]),
@@ -155,10 +156,10 @@ class PartBounds:
     def _bounds(
         self, costliest: "_Costliest", shares: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]:
-        """Bounds (p,), which sets the costliest selections take, and what a set less.
+        """Bounds (p,), which sets the costliest selections take, and what others spare.
 
-        The latter two have shape (p, n_s): by how much the bound is lower of selections
-        that take a set beside the groups.
+        The latter two have shape (p, n_s): selections with a set beside the groups
+        cover so much less than the bound at most.
         """
         steps = np.floor(shares * (self._weights / self._grid))
         # Kernels of BLAS flag what they find beside short rows, now and then.
@@ -189,8 +190,8 @@ class _Costliest:
         self._part = np.repeat(np.arange(len(parts)), n_groups)
         self._rows = np.repeat(self._part, sizes)
         self._starts, self._sizes = np.cumsum(sizes) - sizes, sizes
-        self._fixed = self._closed.copy()
-        self._fixed[self._rows, self._sets] = True
+        self._settled = self._closed.copy()
+        self._settled[self._rows, self._sets] = True
 
     def at(
         self, payments: NDArray[np.float32]
@@ -217,8 +218,7 @@ class _Costliest:
             costs = np.take_along_axis(some, top, axis=1)
             row, column = np.nonzero(costs > 0.0)
             taken[rows[row], top[row, column]] = True
-            # Where fewer are taken than are spare, any may join them.
-            full = costs.shape[1] == spare
-            least[rows] = np.maximum(costs.min(axis=1), 0.0) if full else 0.0
-        spared = np.where(self._fixed | taken, 0.0, least[:, None] - payments)
+            # Where fewer pay than are spare, any may join them: 0.
+            least[rows] = np.maximum(costs.min(axis=1), 0.0)
+        spared = np.where(self._settled | taken, 0.0, least[:, None] - payments)
         return taken, spared

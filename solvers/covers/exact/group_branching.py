@@ -100,8 +100,8 @@ class _Tree(Incumbent):
         self.prices = prices
         self._names = count()
         self._open: list[tuple[float, int, GroupPart]] = []
-        least = self._least_priced
-        self.bounds = PartBounds(prices.priced, n_sets, least, budget, leaves_out=True)
+        least, priced = self._least_priced, prices.priced
+        self.bounds = PartBounds(priced, n_sets, least, budget, leaves_out=True)
         self._alike = likeness(self.bounds.covers, cover.weights)
         sets, floors = np.arange(cover.quotas.size), cover.quotas > 0
         floors &= cover.floored

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from solvers.covers.answers import ExactSearch, Incumbent
 from solvers.covers.bounds.reduced_cover import ReducedCover
-from solvers.covers.bounds.relaxation import rounding
+from solvers.covers.bounds.relaxation import sets_worth_taking
 from solvers.status import WorkBudget
 
 # Larger covers aren't searched: the dense copy takes a byte an entry.
@@ -74,18 +74,17 @@ class _Pairs:
         order = np.argsort(np.diff(cover.by_row.indptr), kind="stable")
         self._weights = cover.weights[order]
         self._missed = ~cover.by_set.astype(bool).toarray()[:, order]
-        self._slack = 1.0 + rounding(cover.weights.size)
 
     def search(
         self, gains: NDArray[np.float64], multipliers: NDArray[np.float64]
     ) -> bool:
         """Offer the best pair of each block of leaders; return whether all were met."""
         cover, best = self.cover, self.best
-        multipliers = np.minimum(multipliers, cover.weights)
-        floor = float(np.sum(cover.weights - multipliers))
-        paid = np.asarray(cover.by_set @ multipliers)
+        sets = np.intersect1d(
+            sets_worth_taking(cover, 2, cover.weights, best.target),
+            sets_worth_taking(cover, 2, multipliers, best.target),
+        )
         self.budget.spend(float(cover.by_set.nnz))
-        sets = np.flatnonzero(self._may_help(gains, 0.0) & self._may_help(paid, floor))
         # The larger of a pair meets the need with every partner that can.
         sets = sets[np.argsort(-gains[sets], kind="stable")]
         gains, missed = gains[sets], self._missed[sets]
@@ -104,10 +103,6 @@ class _Pairs:
                 ends = np.unique([start + i, start + j])
                 best.offer(np.sort(sets[ends]), cover.total - missing)
         return True
-
-    def _may_help(self, values: NDArray[np.float64], base: float) -> NDArray[np.bool_]:
-        """Return the sets that reach the target together with the best other."""
-        return (base + values.max() + values) * self._slack >= self.best.target
 
     def _best_of(
         self, ones: NDArray[np.bool_], others: NDArray[np.bool_]
