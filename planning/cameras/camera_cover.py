@@ -29,6 +29,9 @@ from planning.scene.scene import Scene
 from solvers.bit_rows import pack_rows, unpack_rows
 
 _ROUNDS = 3
+# Lit samples on which cameras are first chosen: fresh draws, at most so many, join the
+# first one where that has fewer. A cover of few samples is denied by any others.
+_LEAST_LIT, _MOST_JOINED = 1000, 3
 
 
 class NothingMeasuredError(InfeasibleLimitsError):
@@ -129,13 +132,13 @@ def confirmed_cover(
     Raises:
         NothingMeasuredError: If no candidate measures any lit sample.
     """
-    target = scene.target_samples(DRAWS.cameras)
+    target, joined = first_samples(scene, projectors)
     samples, measured = measured_samples(scene, projectors, candidates, target)
     for attempt in range(1, _ROUNDS):
         cover = choose(samples, measured)
         if cover.selection.status == "infeasible":
             return cover
-        fresh = scene.target_samples(DRAWS.fresh_cameras.later(attempt))
+        fresh = scene.target_samples(DRAWS.fresh_cameras.later(joined + attempt))
         chosen = cover.selection.chosen
         seen = denial(scene, projectors, cover.candidates, chosen, fresh)
         if seen is None:
@@ -144,6 +147,23 @@ def confirmed_cover(
         samples = lit_samples(scene, projectors, target)
         measured = np.concatenate([measured, seen[:, : len(candidates.cameras)]])
     return choose(samples, measured)
+
+
+def first_samples(
+    scene: Scene, projectors: Sequence[PlannedProjector]
+) -> tuple[Target, int]:
+    """Return the samples that cameras are first chosen on, and how many draws joined.
+
+    These are the first fresh ones.
+    """
+    target, joined = scene.target_samples(DRAWS.cameras), 0
+    for joined in range(1 + _MOST_JOINED):
+        if joined:
+            fresh = scene.target_samples(DRAWS.fresh_cameras.later(joined))
+            target = merged(target, fresh)
+        if len(lit_samples(scene, projectors, target).target) >= _LEAST_LIT:
+            break
+    return target, joined
 
 
 def denial(
@@ -191,7 +211,7 @@ def measured_samples(
         NothingMeasuredError: If no candidate measures any; it names the limits that
             stop most samples.
     """
-    target = target or scene.target_samples(DRAWS.cameras)
+    target = target or first_samples(scene, projectors)[0]
     samples, measured = measured_of(scene, projectors, candidates, target)
     if not measured.any():
         message = _nothing_measured(scene, candidates.cameras, samples)

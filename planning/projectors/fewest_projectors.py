@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.devices.planned import PlannedProjector
+from planning.proofs.completed import completed
 from planning.proofs.quotas import Quotas, RegionFloors
 from planning.proofs.selection import Selection, select_fewest
 from planning.scene.draws import DRAWS
@@ -69,9 +70,7 @@ class Search:
             confirmed = confirms(candidates, chosen, draw)
             if confirmed or selection.status == "infeasible" or last:
                 return Found(candidates, selection, draw, confirmed)
-            fresh = candidates.scene.target_samples(DRAWS.fresh_projectors.later(draw))
-            some = fresh.take(np.arange(0, len(fresh), _JOINING))
-            candidates = candidates.with_samples(candidates.on(some))
+            candidates = candidates.with_samples(_on_fresh(candidates, draw))
             if candidates.scene.has_floors:
                 # Floors leave little to spare: what nearly did is where to look on.
                 begun = np.union1d(begun, selection.chosen)
@@ -87,6 +86,30 @@ class Search:
         if met and confirms(candidates, poses, found.draws):
             return replace(floored, selection=replace(chosen, floors=quotas))
         return self.fewest(floored)
+
+    def completed(self, found: Found) -> Found:
+        """Return projectors with others added until fresh samples don't deny them.
+
+        Where too few are allowed, the smallest cover is, once.
+        """
+        candidates, draw = found.candidates, found.draws
+        cover, selection = candidates.cover, found.selection
+        short = selection.status == "infeasible"
+        if found.confirmed or (short and cover.stock is not None):
+            return found
+        if short:
+            few = selection.smallest
+            few = cover.most_covering(len(few), few)[0]
+            selection = replace(selection, smallest=few)
+        confirmed = False
+        for _ in range(1 if short else self.rounds):
+            chosen = selection.smallest if short else selection.chosen
+            confirmed = confirms(candidates, candidates.of(chosen), draw, spare=0.0)
+            if confirmed:
+                break
+            fresh = _on_fresh(candidates, draw).cover
+            selection, draw = completed(cover, selection, fresh), draw + 1
+        return Found(candidates, selection, draw, confirmed and not short)
 
     def _between(
         self,
@@ -143,13 +166,22 @@ class Search:
         return candidates, selection
 
 
+def _on_fresh(candidates: CandidateSet, draw: int) -> CandidateSet:
+    """What candidates light of some of the fresh samples of a draw."""
+    fresh = candidates.scene.target_samples(DRAWS.fresh_projectors.later(draw))
+    return candidates.on(fresh.take(np.arange(0, len(fresh), _JOINING)))
+
+
 def confirms(
-    candidates: CandidateSet, projectors: Sequence[PlannedProjector], draw: int
+    candidates: CandidateSet,
+    projectors: Sequence[PlannedProjector],
+    draw: int,
+    spare: float = _AIMED,
 ) -> bool:
     """Return whether projectors light enough of samples that are fresh.
 
     Of what they and the candidates reach: of all by a draw of the target, of regions by
-    that and more samples of them.
+    that and more samples of them, where it must be `spare` standard errors more.
     """
     scene = candidates.scene
     samples = scene.target_samples(DRAWS.fresh_projectors.later(draw))
@@ -166,7 +198,7 @@ def confirms(
     def enough(reached: NDArray[np.bool_]) -> bool:
         if lit[:n].sum() < share * reached[:n].sum():
             return False
-        return Quotas.of(floors, reached, 0.0, spare=_AIMED).enough(lit)
+        return Quotas.of(floors, reached, 0.0, spare=spare).enough(lit)
 
     # Where it is enough of all there is, what candidates reach needn't be known.
     if enough(np.ones(len(lit), dtype=bool)):

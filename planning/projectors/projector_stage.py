@@ -90,7 +90,8 @@ def plan_projectors(
     is solved again over all. A minimal cover overfits its samples; so it is tested on
     fresh ones, and where it falls short there, some of them join the samples and the
     cover is solved once more. Floors of regions are looked at last: the fewest that
-    light enough of all may meet them, and else are where the search goes on.
+    light enough of all may meet them, and else are where the search goes on. What fresh
+    samples still lack is added to it.
 
     Raises:
         NothingLitError: If no candidate lights any sample.
@@ -110,6 +111,7 @@ def plan_projectors(
     found = search.fewest(Found(candidates, unsought(candidates.cover), 0, False))
     if plain is not scene:
         found = search.with_floors(found, scene)
+    found = search.completed(found)
     candidates, selection = found.candidates, found.selection
     if found.confirmed and selection.status != "infeasible":
         wider = _with_widest_margin(candidates, selection)

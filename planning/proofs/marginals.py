@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from solvers.covers.cover import DEFAULT_BUDGET
 
+from .completed import greedy_cover
 from .selection import CandidateCover, Selection
 
 # Counts beyond the one taken for which the best candidates are reported.
@@ -64,24 +65,12 @@ def marginals(cover: CandidateCover, selection: Selection) -> Marginals:
 
 
 def _greedy_count(cover: CandidateCover, needed: int) -> int:
-    """How many candidates it takes when each adds most samples, lower index first.
+    """How many candidates the greedy cover takes.
 
-    Of samples that are lacking: of any while the total is, then of regions' alone.
     Where that runs out of stock, of any number of each model, but no fewer than are
     needed.
     """
-    covers, count = cover.covers, cover.n_existing
-    uncovered = ~np.any(covers[:, :count], axis=1)
-    taken = list(range(count))
-    while not cover.quotas.enough(~uncovered):
-        wanted = uncovered & cover.quotas.wanted(~uncovered)
-        gains = covers[wanted].sum(axis=0)
-        if cover.stock is not None:
-            left = cover.stock.left(np.array(taken, dtype=np.int64))
-            gains[left[cover.stock.kinds] <= 0] = 0
-        best = int(np.argmax(gains))
-        if not gains[best] > 0:
-            return max(_greedy_count(cover.without_stock, 0), needed)
-        uncovered &= ~covers[:, best]
-        taken.append(best)
+    taken = greedy_cover(cover, np.arange(cover.n_existing))
+    if taken is None:
+        return max(_greedy_count(cover.without_stock, 0), needed)
     return len(taken)

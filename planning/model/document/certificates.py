@@ -53,7 +53,7 @@ class NeededCount(Part):
     """How many devices the requirement takes, allowed or not.
 
     Attributes:
-        count: Of the smallest cover that was found.
+        count: Of the smallest cover that was found, with what fresh samples lacked.
         lower_bound: Proven least number.
         wider_field: Field with which the devices that are allowed would be enough.
         relaxations: Single changes with which they would be.
