@@ -29,8 +29,8 @@ from planning.scene.scene import Scene
 from solvers.bit_rows import pack_rows, unpack_rows
 
 _ROUNDS = 3
-# Lit samples on which cameras are first chosen: fresh draws, at most so many, join the
-# first one where that has fewer. A cover of few samples is denied by any others.
+# Samples of a draw that are lit: others, at most so many, join one that has fewer. A
+# cover of few samples is denied by any others, and few deny nothing.
 _LEAST_LIT, _MOST_JOINED = 1000, 3
 
 
@@ -132,13 +132,13 @@ def confirmed_cover(
     Raises:
         NothingMeasuredError: If no candidate measures any lit sample.
     """
-    target, joined = first_samples(scene, projectors)
+    target, stream = first_samples(scene, projectors)
     samples, measured = measured_samples(scene, projectors, candidates, target)
-    for attempt in range(1, _ROUNDS):
+    for _ in range(1, _ROUNDS):
         cover = choose(samples, measured)
         if cover.selection.status == "infeasible":
             return cover
-        fresh = scene.target_samples(DRAWS.fresh_cameras.later(joined + attempt))
+        fresh, stream = fresh_samples(scene, projectors, stream)
         chosen = cover.selection.chosen
         seen = denial(scene, projectors, cover.candidates, chosen, fresh)
         if seen is None:
@@ -152,18 +152,31 @@ def confirmed_cover(
 def first_samples(
     scene: Scene, projectors: Sequence[PlannedProjector]
 ) -> tuple[Target, int]:
-    """Return the samples that cameras are first chosen on, and how many draws joined.
+    """Return what cameras are first chosen on, and the next stream of fresh draws."""
+    return _enough_lit(scene, projectors, scene.target_samples(DRAWS.cameras), 1)
 
-    These are the first fresh ones.
-    """
-    target, joined = scene.target_samples(DRAWS.cameras), 0
-    for joined in range(1 + _MOST_JOINED):
-        if joined:
-            fresh = scene.target_samples(DRAWS.fresh_cameras.later(joined))
-            target = merged(target, fresh)
+
+def fresh_samples(
+    scene: Scene, projectors: Sequence[PlannedProjector], stream: int
+) -> tuple[Target, int]:
+    """Return fresh samples from a stream on, and the next stream."""
+    fresh = scene.target_samples(DRAWS.fresh_cameras.later(stream))
+    return _enough_lit(scene, projectors, fresh, stream + 1)
+
+
+def _enough_lit(
+    scene: Scene,
+    projectors: Sequence[PlannedProjector],
+    target: Target,
+    stream: int,
+) -> tuple[Target, int]:
+    """Join fresh draws to samples until enough are lit; and the next stream."""
+    for _ in range(_MOST_JOINED):
         if len(lit_samples(scene, projectors, target).target) >= _LEAST_LIT:
             break
-    return target, joined
+        more = scene.target_samples(DRAWS.fresh_cameras.later(stream))
+        target, stream = merged(target, more), stream + 1
+    return target, stream
 
 
 def denial(

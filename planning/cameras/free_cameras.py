@@ -11,12 +11,11 @@ from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.proofs.moved_poses import free_devices
 from planning.proofs.selection import CandidateCover
 from planning.scene.bodies.clearance import with_clearance
-from planning.scene.draws import DRAWS
 from planning.scene.measuring.measured import measured_by, taken
 from planning.scene.scene import Scene
 from planning.scene.workspace.model_candidates import ModelCandidates, one_of_each
 
-from .camera_cover import CameraCover, candidate_cover, denial
+from .camera_cover import CameraCover, candidate_cover, denial, fresh_samples
 from .camera_routes import cover_by_cover
 from .proved_cameras import CameraStage, camera_stage
 
@@ -62,7 +61,7 @@ class CameraOffer:
 
     def confirms(self, devices: tuple[PlannedCamera, ...], draw: int) -> bool:
         """Return whether they measure enough of fresh samples."""
-        fresh = self.scene.target_samples(DRAWS.fresh_cameras.later(draw))
+        fresh, _ = fresh_samples(self.scene, self.projectors, draw)
         chosen = len(self.known) + np.arange(len(devices))
         offered = self.found.candidates.joined(devices)
         return denial(self.scene, self.projectors, offered, chosen, fresh) is None

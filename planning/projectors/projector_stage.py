@@ -37,10 +37,12 @@ class ProjectorStage(PlannedStage):
     Attributes:
         projectors: The fewest, or the best that are allowed.
         candidates: The reference set, and what it lights of the cover's samples.
+        completed: Whether fresh samples take more than a cover of these samples.
     """
 
     projectors: tuple[PlannedProjector, ...]
     candidates: CandidateSet
+    completed: bool = False
 
     @property
     def reference(self) -> tuple[PlannedProjector, ...]:
@@ -66,7 +68,8 @@ class ProjectorStage(PlannedStage):
             n_regions=int(candidates.scene.region.max()) + 1,
         )
         by_count = {n: candidates.of(chosen) for n, chosen in others.items()}
-        return cls(by_count, proof, candidates.of(selection.chosen), candidates)
+        chosen = candidates.of(selection.chosen)
+        return cls(by_count, proof, chosen, candidates, selection.completed)
 
 
 def _may_exclude(scene: Scene, index: int) -> bool:

@@ -40,9 +40,11 @@ def prove_fewest(
     """Return the stage with the bound over all poses in its certificate.
 
     Where the bound leaves room for fewer projectors, candidates are offered there, and
-    the cover is solved again; unless none are to be `joining` those that there are.
+    the cover is solved again; unless none are to be `joining` those that there are, or
+    it is fresh samples that take as many.
     """
     source = CandidateSource(scene, templates)
+    joining = joining and not stage.completed
     while (bound := bound_of(scene, stage, templates, effort)) is not None:
         better = _better(source, stage, bound, effort) if joining else stage
         if better is stage:

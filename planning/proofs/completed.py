@@ -25,17 +25,16 @@ def completed(
     short = selection.status == "infeasible"
     begun = selection.smallest if short else selection.chosen
     more = greedy_cover(fresh, begun)
-    if more is None:
+    if more is not None and not short:
+        more = more[: cover.most]
+    if more is None or len(more) == len(begun):
         return selection
+    selection = replace(selection, smallest=more, completed=True)
     if short:
-        return replace(selection, smallest=more)
-    more = more[: cover.most]
-    if len(more) == len(begun):
         return selection
     return replace(
         selection,
         chosen=more,
-        smallest=more,
         status="feasible",
         n_covered=cover.n_covered(more),
         n_covered_bound=cover.most_covering(len(more), more)[1],

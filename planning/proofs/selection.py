@@ -46,6 +46,7 @@ class Selection:
         but_for_bodies: How many would do if bodies didn't collide or stand in each
             other's way, where that costs more or leaves too little; else None.
         floors: What must be covered, where regions have floors; else None.
+        completed: Whether candidates were added for fresh samples (`completed`).
     """
 
     chosen: NDArray[np.int64]
@@ -59,6 +60,7 @@ class Selection:
     total_bound: int = 0
     but_for_bodies: int | None = None
     floors: Quotas | None = None
+    completed: bool = False
 
     @property
     def needed(self) -> int:

@@ -49,8 +49,8 @@ def lit_ball(monkeypatch):
 def test_draws_join_until_enough_is_lit(monkeypatch, lit_ball, least, joined):
     scene, projectors, _ = lit_ball
     monkeypatch.setattr(camera_cover, "_LEAST_LIT", least)
-    target, more = first_samples(scene, projectors)
-    assert more == joined
+    target, stream = first_samples(scene, projectors)
+    assert stream == 1 + joined
     assert len(target) == 300 + 900 * joined
     draws = [DRAWS.cameras, *(DRAWS.fresh_cameras.later(k) for k in (1, 2, 3))]
     points = [scene.target_samples(draw).samples.points for draw in draws]

@@ -31,7 +31,7 @@ from solvers.status import WorkBudget
 _BUDGET, _SPARE = 3e9, 1 / 250
 # Of fresh samples that confirmed no cover of projectors one in so many joined.
 _JOINED = 3
-_MOST_ROUNDS = 6
+_MOST_ROUNDS = 12
 # Farther apart devices stand elsewhere [m].
 _MOVED = 1e-6
 
