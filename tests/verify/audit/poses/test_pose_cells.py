@@ -96,7 +96,7 @@ def _shape(name: str) -> tuple[TriangleMesh, Shadow, AuditSamples, Workspace]:
 def _maps(name: str) -> Skies:
     _, shadow, samples, _ = _shape(name)
     angles = _LIMITS.max_incidence, _LIMITS.min_tangent_angle
-    maps = SkyMaps(samples, shadow.caster, *angles, 2.0 * shadow.slack_m)
+    maps = SkyMaps(samples, shadow.caster, *angles, 2.0 * shadow.slack_m, 100)
     return maps.of(np.arange(len(samples)), lambda _: None)
 
 

@@ -12,11 +12,14 @@ from planning.verify.audit.proofs.poses.outlines import Outlines
 from planning.verify.audit.proofs.poses.skies import Skies, SkyMaps
 
 _CAP, _TANGENT = np.radians(65.0), np.radians(80.0)
-_PIXEL = np.radians(65.0) / 60.0
+_FINENESS = pytest.mark.parametrize("pixels", [100, 200])
 
 
 def _sky(
-    mesh: TriangleMesh, steep: tuple[float, float, float], tangent: float
+    mesh: TriangleMesh,
+    steep: tuple[float, float, float],
+    tangent: float,
+    pixels: int = 100,
 ) -> Skies:
     """Of the origin, which lies on the first face of a mesh, normal to z."""
     one = np.zeros(1, dtype=np.int64)
@@ -30,7 +33,8 @@ def _sky(
         np.ones(1),
     )
     shadow = Shadow(mesh, threads=1)
-    maps = SkyMaps(samples, shadow.caster, _CAP, tangent, 2.0 * shadow.slack_m)
+    angles = _CAP, tangent
+    maps = SkyMaps(samples, shadow.caster, *angles, 2.0 * shadow.slack_m, pixels)
     return maps.of(one, lambda _: None)
 
 
@@ -46,10 +50,11 @@ def _ground() -> TriangleMesh:
     return TriangleMesh(flat.vertices + [0.05, -0.02, 0.0], flat.faces)
 
 
-def test_a_belt_stays_open_as_far_as_it_is_and_no_farther() -> None:
+@_FINENESS
+def test_a_belt_stays_open_as_far_as_it_is_and_no_farther(pixels: int) -> None:
     # All is closed but what is ten degrees or less from the plane across T1.
     towards = _within_cap(40_000)
-    sky = _sky(_ground(), (1.0, 0.0, 0.0), _TANGENT)
+    sky = _sky(_ground(), (1.0, 0.0, 0.0), _TANGENT, pixels)
     none = np.zeros(len(towards), dtype=np.int64)
     margin = np.abs(np.arcsin(towards[:, 0])) - np.radians(10.0)
     nearest = towards * [0.0, 1.0, 1.0]
@@ -60,19 +65,21 @@ def test_a_belt_stays_open_as_far_as_it_is_and_no_farther() -> None:
     assert held.sum() > 10_000
     assert not sky.closed(none, towards, 1.001 * np.abs(margin) + 1e-6)[held].any()
     # The map stretches by 1.25 at most, and a few pixels are lost at the edge.
-    inner = held & (margin > 6.0 * _PIXEL)
-    assert sky.closed(none, towards, 0.75 * margin - 4.0 * _PIXEL)[inner].all()
+    pixel = _CAP / pixels
+    inner = held & (margin > 6.0 * pixel)
+    assert sky.closed(none, towards, 0.75 * margin - 4.0 * pixel)[inner].all()
     assert inner.sum() > 1000
 
 
-def test_a_wall_closes_what_is_behind_it() -> None:
+@_FINENESS
+def test_a_wall_closes_what_is_behind_it(pixels: int) -> None:
     # A wall at x = 1 from y = -1 to 1, without end in z: its sides are planes by y.
     ground, wall = _ground(), grid(40.0, 2.0, divisions=(1, 1))
     upright = np.column_stack(
         [np.ones(len(wall.vertices)), wall.vertices[:, 1], wall.vertices[:, 0]]
     )
     mesh = TriangleMesh.joined([ground, TriangleMesh(upright, wall.faces)])
-    sky = _sky(mesh, (0.0, 0.0, 0.0), 0.0)
+    sky = _sky(mesh, (0.0, 0.0, 0.0), 0.0, pixels)
     towards = _within_cap(40_000)
     none = np.zeros(len(towards), dtype=np.int64)
     x, y, z = towards.T
@@ -82,7 +89,7 @@ def test_a_wall_closes_what_is_behind_it() -> None:
     # Angles to both sides, y = x and y = -x, and to the top, z = 20 x.
     sides = np.arcsin((x - np.abs(y)) / 2.0**0.5)
     margin = np.minimum(sides, np.arcsin((20.0 * x - z) / 401.0**0.5))
-    assert shut[margin > 5.0 * _PIXEL].all()
+    assert shut[margin > 5.0 * _CAP / pixels].all()
     assert shut.sum() > 4000
 
 

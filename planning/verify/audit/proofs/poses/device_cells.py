@@ -23,6 +23,9 @@ from .sphere_cells import Cells
 from .too_few import OptimisticCells
 
 _Make = Callable[[Ints, Skies | None], OptimisticCells]
+# Pixels from the middle to the rim of maps of what is blocked: the finer ones take four
+# times as long, and are drawn where the others leave cells open.
+_PIXELS = (100, 200)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,24 +36,27 @@ class DeviceCells:
         roots: Cells that hold all poses together.
         object_m: Farthest a sample is from the centre; 0 of parallel light [m].
         make: What cells serve of some samples, with or without their skies.
-        maps: What is blocked of samples; None: nothing that counts.
+        maps: What is blocked of samples, ever finer; none where nothing counts.
     """
 
     roots: Cells
     object_m: float
     make: _Make
-    maps: SkyMaps | None
+    maps: tuple[SkyMaps, ...]
 
     @property
-    def stages(self) -> tuple[bool, ...]:
-        """Whether shadows are counted, in each attempt."""
-        return (False,) if self.maps is None else (False, True)
+    def stages(self) -> tuple[SkyMaps | None, ...]:
+        """The maps of each attempt; None: shadows don't count."""
+        return None, *self.maps
+
+    def counts(self, maps: SkyMaps | None) -> bool:
+        """Return whether all that counts of shadows is in these maps."""
+        return maps is not None or not self.maps
 
     def of(
-        self, some: Ints, say: Callable[[str], None], *, shadows: bool
+        self, some: Ints, say: Callable[[str], None], maps: SkyMaps | None
     ) -> OptimisticCells:
         """Return what cells serve of some of the samples, by their numbers."""
-        maps = self.maps if shadows else None
         return self.make(some, None if maps is None else maps.of(some, say))
 
 
@@ -82,11 +88,12 @@ def device_cells(
         incidence = limits.projector.max_incidence
         tangent = limits.projector.min_tangent_angle
         make = partial(_lit, plan, samples, ends, aside)
-    maps = None
+    maps = ()
     # A ray that ends among the faces may be blocked beyond its device.
     if shadows and depth >= reach and incidence < 0.5 * np.pi:
         touching_m = 2.0 * case.shadow.slack_m
-        maps = SkyMaps(samples, case.shadow.caster, incidence, tangent, touching_m)
+        given = samples, case.shadow.caster, incidence, tangent, touching_m
+        maps = tuple(SkyMaps(*given, pixels) for pixels in _PIXELS)
     return DeviceCells(
         Cells.of_shell(*shell), 0.0 if aside is not None else object_m, make, maps
     )

@@ -22,6 +22,7 @@ from planning.verify.audit.proofs.frozen_samples import (
 from planning.verify.audit.proofs.refutation import RefutedProofError
 
 from .device_cells import DeviceCells, device_cells, free_of_existing, lit_by_plan
+from .skies import SkyMaps
 from .too_few import Outcome, Question, most_of_one
 
 # Share of the samples by which lit ones may differ from those that were planned.
@@ -164,9 +165,9 @@ def _derived(
 
 @dataclass(frozen=True, eq=False)
 class _Search:
-    """Asks about so many devices: without shadows first, which takes no maps.
+    """Asks about so many devices: without shadows first, then by ever finer maps.
 
-    Multipliers that suffice look at fewest cells; pairs are looked at last.
+    Multipliers that suffice look at fewest cells; pairs take maps, where there are any.
     """
 
     cells: DeviceCells
@@ -183,18 +184,17 @@ class _Search:
         # What costs nothing closes no cell.
         paying = multipliers > 0
         outcome = Outcome(False, "")
-        for shadows in self.cells.stages:
-            asked = self._question(self.wanted[paying], shadows=shadows)
+        for maps in self.cells.stages:
+            asked = self._question(self.wanted[paying], maps)
             outcome = asked.by_multipliers(most, multipliers[paying])
+            if n_devices == 2 and not outcome.too_few and self.cells.counts(maps):
+                outcome = self._question(self.wanted, maps).by_pairs(least)
             if outcome.too_few:
-                return outcome
-        if n_devices == 2:
-            asked = self._question(self.wanted, shadows=self.cells.stages[-1])
-            return asked.by_pairs(least)
+                break
         return outcome
 
-    def _question(self, some: Ints, *, shadows: bool) -> Question:
-        made = self.cells.of(some, self.say, shadows=shadows)
+    def _question(self, some: Ints, maps: SkyMaps | None) -> Question:
+        made = self.cells.of(some, self.say, maps)
         told = _Told(self.say)
         return Question(self.cells.roots, made, len(some), self.cells.object_m, told)
 

@@ -28,8 +28,8 @@ from planning.verify.audit.audit_samples import AuditSamples
 from .outlines import Outlines
 from .sphere_cells import Cells
 
-# Pixels from the middle to the rim of the cap, and beyond it.
-_CAP, _BEYOND = 100, 4
+# Pixels beyond the rim of the cap.
+_BEYOND = 4
 # Half a pixel's diagonal, and how far apart directions along an outline are drawn [px].
 _HALF, _STEP = 0.5**0.5, 0.9
 # Shares of the size of the mesh: of faces within these, outlines are drawn alone too.
@@ -47,11 +47,13 @@ class Skies:
         cap: T, the largest incidence [rad].
         frames: Two directions across N, and N, of each sample, (n, 3, 3).
         radii: Pixels to the nearest that isn't closed, rounded down, (n, s, s).
+        pixels: From the middle of a map to the rim of the cap.
     """
 
     cap: float
     frames: Array
     radii: NDArray[np.uint8]
+    pixels: int
 
     def leave_open(
         self, served: Mask, cells: Cells, psi: Array, points: Array | None
@@ -66,7 +68,7 @@ class Skies:
 
         Cells are seen within psi (k,) of unit directions (k, 3).
         """
-        reach = psi / np.sin(self.cap) * _CAP + 2.0 * _HALF
+        reach = psi / np.sin(self.cap) * self.pixels + 2.0 * _HALF
         return self._radius(samples, towards) > reach
 
     def shut(self, samples: Ints, towards: Array) -> Mask:
@@ -75,7 +77,8 @@ class Skies:
 
     def _radius(self, samples: Ints, towards: Array) -> NDArray[np.uint8]:
         local = np.einsum("kij,kj->ki", self.frames[samples], towards)
-        at = _pixels(_flat(local, self.cap, clamped=True))
+        flat = _flat(local, self.cap, self.pixels, clamped=True)
+        at = _places(flat, self.pixels)
         return self.radii[samples, at[:, 0], at[:, 1]]
 
 
@@ -88,6 +91,7 @@ class SkyMaps:
         cap: Largest incidence, below a right angle [rad].
         tangent: Least angle to the line of T1 [rad].
         touching_m: Faces that come nearer to a sample block nothing of it.
+        pixels: From the middle of a map to the rim of the cap.
     """
 
     def __init__(
@@ -97,17 +101,19 @@ class SkyMaps:
         cap: float,
         tangent: float,
         touching_m: float,
+        pixels: int,
     ) -> None:
         self._samples, self._caster, self._cap = samples, caster, cap
         self._tangent, self._touching_m = tangent, touching_m
+        self._pixels = pixels
         self._outlines = Outlines(caster.mesh)
         frames = [_frame(normal) for normal in samples.normals]
         self._frames = np.array(frames).reshape(-1, 3, 3)
         self._done = np.zeros(len(samples), dtype=bool)
-        side = 2 * (_CAP + _BEYOND) + 1
+        side = 2 * (pixels + _BEYOND) + 1
         self._radii = np.zeros((len(samples), side, side), dtype=np.uint8)
-        offsets = (np.indices((side, side)) - (_CAP + _BEYOND)).reshape(2, -1).T
-        self._pixel = pixel = cap / _CAP
+        offsets = (np.indices((side, side)) - (pixels + _BEYOND)).reshape(2, -1).T
+        self._pixel = pixel = cap / pixels
         self._off = off = pixel * np.linalg.norm(offsets, axis=1)
         share = np.sinc(off / np.pi)[:, None] * pixel
         self._local = np.column_stack([share * offsets, np.cos(off)])
@@ -121,7 +127,7 @@ class SkyMaps:
             mapped(self._draw, part, self._caster.threads)
             say(f"shadows of {begin + len(part)} of {len(missing)} samples")
         self._done[some] = True
-        return Skies(self._cap, self._frames[some], self._radii[some])
+        return Skies(self._cap, self._frames[some], self._radii[some], self._pixels)
 
     def _draw(self, k: int) -> None:
         pixel, samples = self._pixel, self._samples
@@ -135,6 +141,7 @@ class SkyMaps:
             self._caster,
             samples.points[k],
             self._touching_m,
+            self._pixels,
         )
         closed |= sky.blocked(self._frames[k], self._local, drawn, self._cap)
         far: Array = np.asarray(distance_transform_edt(closed.reshape(side)))
@@ -149,6 +156,7 @@ class _Sky:
     caster: RayCaster
     point: Array
     touching_m: float
+    pixels: int
 
     def blocked(self, frame: Array, local: Array, drawn: Mask, cap: float) -> Mask:
         """Return which pixels are blocked for sure; those of `drawn` are looked at."""
@@ -179,14 +187,14 @@ class _Sky:
         self, frame: Array, drawn: Mask, cap: float, sides: Array, some: Mask
     ) -> tuple[Ints, int]:
         """Number the pieces of pixels that no outline comes near, from 1; 0: others."""
-        pixel = cap / _CAP
+        pixel = cap / self.pixels
         rim = cap + 3.0 * pixel
         step = _STEP * pixel * np.sin(rim) / rim
         edges = self.outlines.of_faces(sides, some)
         edges = edges[self.outlines.above(self.point, frame[2], edges)]
         sky = self.outlines.arcs(self.point, edges, step) @ frame.T
         sky = sky[sky[:, 2] >= np.cos(rim)]
-        at = _pixels(_flat(sky, cap))
+        at = _places(_flat(sky, cap, self.pixels), self.pixels)
         touched = np.zeros(drawn.shape, dtype=bool)
         touched[at[:, 0], at[:, 1]] = True
         # A direction between two that were drawn is at most a pixel aside.
@@ -198,18 +206,18 @@ class _Sky:
         return pieces.ravel().astype(np.int64), int(pieces.max())
 
 
-def _flat(local: Array, cap: float, *, clamped: bool = False) -> Array:
-    """Return where directions (n, 3) lie on the map, (n, 2) [px]."""
+def _flat(local: Array, cap: float, pixels: int, *, clamped: bool = False) -> Array:
+    """Return where directions (n, 3) lie about the middle of the map, (n, 2) [px]."""
     across = np.hypot(local[:, 0], local[:, 1])
     off = np.arctan2(across, local[:, 2])
     if clamped:
         off = np.minimum(off, cap)
-    scale = off * _CAP / cap / np.where(across > 0.0, across, 1.0)
+    scale = off * pixels / cap / np.where(across > 0.0, across, 1.0)
     return scale[:, None] * local[:, :2]
 
 
-def _pixels(flat: Array) -> Ints:
-    return np.rint(flat).astype(np.int64) + _CAP + _BEYOND
+def _places(flat: Array, pixels: int) -> Ints:
+    return np.rint(flat).astype(np.int64) + pixels + _BEYOND
 
 
 def _frame(normal: Array) -> Array:
