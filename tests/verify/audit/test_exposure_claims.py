@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from planning.verify.audit.devices.exposure_claims import most_beyond
+from planning.verify.audit.devices.exposure_claims import most_beyond, n_beyond
 
 
 def case_of(n_audited, n_claimed):
@@ -25,3 +25,12 @@ def test_extremes_of_fewer_samples_are_not_denied_by_their_draw(n_audited, n_cla
     # Nor is much more allowed: a sixth of the samples beyond would be noticed.
     assert most < n_audited / 6
     assert most_beyond(case_of(0, n_claimed)) == 0.0
+
+
+def test_rounding_lies_beyond_nothing():
+    # As a plane in parallel light comes out.
+    values = 254.4 * (1.0 + np.linspace(-1e-12, 1e-12, 101))
+    assert n_beyond(values, values[0]) == 0
+    assert n_beyond(values + 1e-3, 254.4) == 101
+    assert n_beyond(np.array([0.8, 0.9, 1.0]), 0.85) == 2
+    assert n_beyond(np.zeros(5), -np.inf) == 5

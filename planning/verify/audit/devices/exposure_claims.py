@@ -13,7 +13,7 @@ from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.predicates.light_levels import LightLevels
 
-_EXACT = 1e-9
+_EXACT, _ROUNDED = 1e-9, 1e-6
 # Of the brightest, the farthest and the most grazing of some samples, against others.
 _EXTREME = 0.03
 # With what chance samples of the audit may deny an extreme that is true.
@@ -110,6 +110,14 @@ def _audit_time(
     )
 
 
+def n_beyond(values: Array, largest: float) -> int:
+    """Return how many lie beyond an extreme by more than it may be written off.
+
+    In parallel light all of a plane is equally bright, but for rounding.
+    """
+    return int((values > largest + _ROUNDED * max(largest, 1.0)).sum())
+
+
 def most_beyond(case: AuditCase) -> float:
     """Return how many of m samples may lie beyond the largest of n others.
 
@@ -143,7 +151,7 @@ def _audit_extremes(
         if grey is not None:
             _audit_grey(case, p, grey, light, below.at(name))
             largest = np.max(getattr(grey, claimed))
-        n = int((values > largest).sum())
+        n = n_beyond(values, float(largest))
         below.holds(
             n <= most_beyond(case),
             name,
@@ -164,12 +172,12 @@ def _audit_grey(
     along, _ = projector.light.to_points(point)
     levels = LightLevels.of(light, projector, point, normal)
     away = np.linalg.norm(point[0] - projector.world_from_device[:3, 3])
-    below.number("distance_m", grey.distance_m, float(away), 1e-6, "m")
+    below.number("distance_m", grey.distance_m, float(away), _ROUNDED, "m")
     incidence = float(np.arccos(np.clip(-(along @ normal[0]), -1.0, 1.0))[0])
-    below.number("incidence", grey.incidence, incidence, 1e-6, "rad")
+    below.number("incidence", grey.incidence, incidence, _ROUNDED, "rad")
     for name, claimed, electrons in (
         ("lit", grey.lit, levels.lit),
         ("dark", grey.dark, levels.dark),
     ):
         truth: Array = levels.grey(electrons) * np.array(light.albedo)
-        below.same(name, list(claimed), truth, "recomputed", 1e-6 * truth.max())
+        below.same(name, list(claimed), truth, "recomputed", _ROUNDED * truth.max())
