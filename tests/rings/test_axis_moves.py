@@ -296,28 +296,29 @@ def test_auto_takes_centred_axes_where_they_cost_no_camera(ball):
 def test_centred_axes_are_planned_whole_only_where_they_may_be_taken(ball, monkeypatch):
     """Free ones that save a camera end it; as many are held against centred ones.
 
-    In diverging light the first samples say that centred ones do with two cameras,
-    which fresh ones deny: free ones come after them.
+    Centred ones that no others beat stand alone, unless fresh samples deny them.
     """
     whole, projectors, cover = ball
-    scene = replace(whole, requirements=replace(whole.requirements, coverage=0.9))
     asked, plain = [], cover_axes
 
     def told(*given):
         asked.append(given[-1])
         return plain(*given)
 
-    def placed():
+    def placed(coverage):
         asked.clear()
-        views = cover.candidates
+        required = replace(whole.requirements, coverage=coverage)
+        scene, views = replace(whole, requirements=required), cover.candidates
         place_for_axes(scene, projectors, views, "cover", axis="auto", margin=5e-3)
         return asked
 
     monkeypatch.setattr(axis_choice, "cover_axes", told)
     few = projectors[0].light == "parallel"
-    assert placed() == (["free"] if few else ["centred", "free"])
-    monkeypatch.setattr(axis_choice, "_needed_by_more", lambda *_: 2)
-    assert placed() == ["free", "centred"]
+    assert placed(0.85) == ["centred"]
+    assert placed(0.9) == ["free"]
+    assert placed(0.74 if few else 0.76) == ["free", "centred"]
+    monkeypatch.setattr(axis_choice, "_needed_by_more", lambda *_: None)
+    assert placed(0.9) == ["centred", "free"]
 
 
 def test_what_cameras_see_bounds_what_any_axes_need(ball):
