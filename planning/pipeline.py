@@ -109,8 +109,8 @@ def plan_rig(
             they break are told and refuse nothing. 0 with the pattern `none`.
         max_cameras: Cameras at most; None: as many as the coverage needs.
         max_heads: Instead, of a rig with a `[head]`: heads at most, or its stations.
-        target: The `dominant` regions, or the whole `surface`; None: the former, and
-            the latter of a body known by its ranges.
+        target: The `dominant` regions, the whole `surface`, or what of it lies
+            `outside`; None: the first, and the second of a body known by its ranges.
         select: Faces that are the target instead of the dominant regions: one bool a
             face of the mesh, or face indices, or from `read_selection`.
         weight: Of each vertex of the mesh, at least 0, or from `read_weight`: takes the

@@ -98,6 +98,13 @@ def lies_inside(caster: RayCaster, faces: Ints, points: Array) -> Mask:
     return _sight(caster, spots_at(caster.mesh, faces, points))[2]
 
 
+def outside_faces(caster: RayCaster) -> Mask:
+    """Return whether each face's centroid lies outside, as `lies_inside`, (n_f,)."""
+    mesh = caster.mesh
+    inside = lies_inside(caster, np.arange(len(mesh.faces)), mesh.face_centroids)
+    return ~inside
+
+
 def _kind(share: float, wall_m: float | None, thin_m: float) -> str:
     if wall_m is None or not share >= _SOME:
         return SOLID

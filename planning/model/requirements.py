@@ -280,7 +280,7 @@ class Requirements:
     coverage: float
     dominant_coverage: float
     min_reachable: float
-    target: Literal["dominant", "surface"]
+    target: Literal["dominant", "surface", "outside"]
     pattern: Literal["rings", "dense", "none"]
     projector: ProjectorLimits
     camera: CameraLimits

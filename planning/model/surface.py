@@ -115,10 +115,9 @@ class Surface:
         return self.region >= 0
 
     def target_faces(self, target: str) -> Mask:
-        """Return whether each face is in the target, `dominant` or `surface`."""
-        return (
-            self.in_dominant if target == "dominant" else np.ones_like(self.in_dominant)
-        )
+        """Return whether each face is in the target: all of `surface`, or regions."""
+        whole = np.ones_like(self.in_dominant)
+        return whole if target == "surface" else self.in_dominant
 
     def sha256(self) -> str:
         """Return the hexadecimal SHA-256 digest of `content`."""

@@ -13,6 +13,7 @@ import numpy as np
 from geometry.curvature.curvature import CurvatureField, principal_curvatures
 from geometry.regions.regions import DominantRegions, dominant_regions
 from geometry.regions.selected_regions import regions_of_faces
+from geometry.repair.hollow import outside_faces
 from planning.cameras.baselines.baseline_rows import baseline_rows
 from planning.cameras.baselines.seams import SampledSurface, overlap_components
 from planning.model.document.coverage_records import (
@@ -71,7 +72,7 @@ def made_again(plan: RigPlan, *, threads: int) -> dict[str, Any]:
     rings = [record.rings for record in document.projectors]
     known = tuple(record for record in rings if record is not None)
     field = principal_curvatures(scene.mesh)
-    regions = _regions(plan, field)
+    regions = _regions(plan, scene, field)
     parts: dict[str, Any] = {
         "coverage": _coverage(plan, scene, devices, claims),
         "regions": entries.region_records(scene.mesh, regions, claims),
@@ -129,12 +130,15 @@ def _coverage(
     return coverage.changed(unmeasurable_by_cause=causes)
 
 
-def _regions(plan: RigPlan, field: CurvatureField) -> DominantRegions:
-    """The regions of the surface: found in its curvature, or those of chosen faces."""
-    mesh, selection = plan.surface.mesh, plan.document.surface.selection
+def _regions(plan: RigPlan, scene: Scene, field: CurvatureField) -> DominantRegions:
+    """The regions of the surface: of its curvature, its outside, or chosen faces."""
+    mesh, selection = scene.mesh, plan.document.surface.selection
     if selection is None or selection.kind == "curvature":
         return dominant_regions(mesh, field)
-    return regions_of_faces(mesh, field, plan.surface.in_dominant)
+    chosen = plan.surface.in_dominant
+    if selection.kind == "outside":
+        chosen = outside_faces(scene.visibility.caster)
+    return regions_of_faces(mesh, field, chosen)
 
 
 def _surface_digest(plan: RigPlan, regions: DominantRegions) -> str:

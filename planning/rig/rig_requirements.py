@@ -55,7 +55,7 @@ def build_requirements(
     """
     shares = table.requirements
     target = wishes.target or "dominant"
-    _check_choice("target", target, ("dominant", "surface"))
+    _check_choice("target", target, ("dominant", "surface", "outside"))
     _check_choice("pattern", wishes.pattern, ("rings", "dense", "none"))
     check_counts(wishes)
     alone = wishes.pattern == "none"

@@ -8,7 +8,7 @@ from planning.model.errors import InputError
 
 Pattern = Literal["rings", "dense", "none"]
 AccuracyOf = Literal["noise", "total"]
-TargetName = Literal["dominant", "surface"]
+TargetName = Literal["dominant", "surface", "outside"]
 # Pairs that may be asked for of each point: more are no survival but another rig.
 MOST_VIEWS = 8
 

@@ -12,8 +12,10 @@ from geometry.curvature.curvature import (
 )
 from geometry.devices import DeviceModel
 from geometry.mesh.bearing import bearing
+from geometry.rays.rays import RayCaster
 from geometry.regions.regions import DominantRegions, dominant_regions
 from geometry.regions.selected_regions import regions_of_faces
+from geometry.repair.hollow import outside_faces
 from planning.cameras.camera_cover import camera_candidate_views
 from planning.model.devices.device_poses import moved_to
 from planning.model.devices.planned import PlannedCamera, PlannedProjector
@@ -126,9 +128,11 @@ def _first_rings(rig: Rig, device: DeviceModel) -> NDArray[np.float64]:
 
 
 def _regions(request: PlanRequest, field: CurvatureField) -> DominantRegions:
-    """The user's selection, or else the most curved surface."""
+    """The user's selection, what lies outside, or else the most curved surface."""
     if request.interest is not None:
         return regions_of_faces(request.mesh, field, request.interest.chosen)
+    if request.wishes.target == "outside":
+        return _regions_outside(request, field)
     regions = request.cache.recall(
         "dominant_regions",
         (request.mesh,),
@@ -140,6 +144,19 @@ def _regions(request: PlanRequest, field: CurvatureField) -> DominantRegions:
             "trusted; use --target surface, or choose faces with --select"
         )
     return regions
+
+
+def _regions_outside(request: PlanRequest, field: CurvatureField) -> DominantRegions:
+    mesh = request.mesh
+    outside = request.cache.recall(
+        "outside_faces", (mesh,), lambda: outside_faces(RayCaster(mesh))
+    )
+    if not outside.any():
+        raise InputError(
+            "no face lies outside: each sees too little of what is about the mesh; "
+            "choose faces with --select"
+        )
+    return regions_of_faces(mesh, field, outside)
 
 
 def _resolve(request: PlanRequest) -> tuple[Requirements, NDArray[np.float64]]:

@@ -105,6 +105,8 @@ UNAUDITED_OF_CHECK = {
     "likely causes of what the check missed": ("reconstruction.failures",),
 }
 # Of the mesh file, which isn't part of the plan.
+# By what faces are chosen that no user chose.
+_FOUND = {"curvature": "curvature", "outside": "what lies outside"}
 _OF_FILE = "the mesh file, its digest, size and repairs (meshes): give --mesh {path}"
 
 
@@ -204,11 +206,12 @@ def of_surface(plan: RigPlan, claims_held: str) -> tuple[str, ...]:
     surface, requirements = plan.document.surface, plan.requirements
     kind = "curvature" if surface.selection is None else surface.selection.kind
     lines: list[str] = []
-    if kind != "curvature" or claims_held != EXACTLY:
-        what = "which faces are the target" * (requirements.target == "dominant")
-        chosen = "by curvature, says surface.selection"
-        if kind != "curvature":
-            chosen = "by a file that surface.selection names"
+    found = kind in _FOUND
+    if not found or claims_held != EXACTLY:
+        what = "which faces are the target" * (requirements.target != "surface")
+        chosen = "by a file that surface.selection names"
+        if found:
+            chosen = f"by {_FOUND[kind]}, says surface.selection"
         what = what or "which faces are of which region"
         lines.append(f"{what} (region in surface.npz): chosen {chosen}")
     lines += [

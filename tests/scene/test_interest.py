@@ -3,6 +3,7 @@
 import hashlib
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from geometry.shapes.primitives import sphere
 from planning import RigPlan, load_rig, plan_rig, verify_plan
 from planning.cli.main import main
 from planning.model.errors import InputError
+from planning.report.made_again import made_again
 from planning.report.summary.summary import summary
 from planning.scene.interest import interest_of, read_selection, read_weight
 from planning.verify.audit.audit import audit_plan
@@ -352,6 +354,66 @@ def test_a_plan_for_a_selection_verifies_and_a_changed_one_does_not(
         assert [f for f in found.failures if f.startswith(f"surface.selection.{key}")]
 
 
+# What lies outside
+
+
+@pytest.fixture(scope="module")
+def outside(with_little_work) -> RigPlan:
+    """Of a ball in whose middle there is another one, all that can be seen."""
+    outer, inner = sphere(0.05, subdivisions=3), sphere(0.03, subdivisions=3)
+    hollow = TriangleMesh(
+        np.concatenate([outer.vertices, inner.vertices]),
+        np.concatenate([outer.faces, inner.faces[:, ::-1] + len(outer.vertices)]),
+    )
+    with with_little_work():
+        return plan_rig(
+            hollow,
+            load_rig("default"),
+            max_projectors=4,
+            target="outside",
+            dominant_coverage=0.3,
+            coverage=0.5,
+            region_coverage=0.0,
+            check=False,
+            on_miss="return",
+        )
+
+
+def test_what_lies_inside_is_left_out_of_the_target(outside: RigPlan) -> None:
+    surface, document = outside.surface, outside.to_document()
+    far = np.linalg.norm(surface.mesh.face_centroids, axis=1) > 0.04
+    np.testing.assert_array_equal(surface.region >= 0, far)
+    area = surface.mesh.face_areas[far].sum()
+    assert document["coverage"]["target"]["area_m2"] == pytest.approx(area, rel=1e-9)
+    assert document["coverage"]["unreachable_inside_m2"] == 0.0
+    assert document["requirements"]["target"] == "outside"
+    selection = document["surface"]["selection"]
+    assert (selection["kind"], selection["source"]) == ("outside", None)
+    text = summary(outside, [], ())
+    assert "target (outside)" in text
+    assert f"{len(document['regions'])} regions of the outside" in text
+    assert "dominant" not in text
+
+
+def test_a_plan_for_the_outside_verifies_and_another_target_does_not(
+    outside: RigPlan,
+) -> None:
+    assert verify_plan(outside, seed=5, check_pixels=False).failures == ()
+    differs = outside.surface.region.copy()
+    differs[np.flatnonzero(differs >= 0)[0]] = -1
+    for region, same in ((outside.surface.region, True), (differs, False)):
+        stated = replace(outside, surface=replace(outside.surface, region=region))
+        again = made_again(stated, threads=2)["surface"]["sha256"]
+        assert (again == stated.surface.sha256()) == same
+    for kind, told in (("faces", "outside"), ("outside", "dominant")):
+        document = outside.to_document()
+        document["surface"]["selection"]["kind"] = kind
+        document["requirements"]["target"] = told
+        plan = RigPlan.from_document(document, outside.surface)
+        found = audit_plan(plan, n_samples=1000).failures
+        assert f"surface.selection.kind: is {kind!r}" in " ".join(found)
+
+
 def in_process(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], *words: object
 ) -> tuple[int, str, str]:
@@ -369,6 +431,7 @@ def in_process(
         (["--select", "a", "--weight", "b"], 2, "--select or --weight, not both"),
         (["--select", "a", "--target", "surface"], 2, "--target surface or --select"),
         (["--weight", "a", "--target", "surface"], 2, "--target surface or --weight"),
+        (["--select", "a", "--target", "outside"], 2, "--target outside or --select"),
         (["--select", ""], 2, "--select '' names no file"),
         (["--select", "absent.txt"], 3, "absent.txt: can't be read"),
         (["--select", "ply:absent"], 3, "no face property 'absent'"),

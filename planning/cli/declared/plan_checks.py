@@ -143,10 +143,10 @@ def _check_ranges(options: dict[str, Any]) -> None:
     ):
         if options[name] is not None:
             raise click.UsageError(f"--{name.replace('_', '-')} with --ranges: {why}")
-    if options["target"] == "dominant":
+    if options["target"] not in (None, "surface"):
         raise click.UsageError(
-            "--target dominant with --ranges: a sphere has no dominant region; the "
-            "target is its whole surface"
+            f"--target {options['target']} with --ranges: a sphere has no dominant "
+            "region and no inside; the target is its whole surface"
         )
 
 
@@ -154,7 +154,9 @@ def _check_target(options: dict[str, Any]) -> None:
     chosen = [name for name in ("select", "weight") if options[name] is not None]
     if len(chosen) == 2:
         raise click.UsageError("give --select or --weight, not both")
-    if chosen and options["target"] == "surface":
-        raise click.UsageError(f"give --target surface or --{chosen[0]}, not both")
+    if chosen and options["target"] in ("surface", "outside"):
+        raise click.UsageError(
+            f"give --target {options['target']} or --{chosen[0]}, not both"
+        )
     if chosen and not options[chosen[0]]:
         raise click.UsageError(f"--{chosen[0]} '' names no file")

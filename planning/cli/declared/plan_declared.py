@@ -172,8 +172,9 @@ class GroupedCommand(click.Command):
 )
 @click.option(
     "--target",
-    type=click.Choice(["dominant", "surface"]),
-    help="What must be covered [default: dominant; with --ranges surface].",
+    type=click.Choice(["dominant", "surface", "outside"]),
+    help="What must be covered: what bends most, all, or all but what lies inside the "
+    "body [default: dominant; with --ranges surface].",
 )
 @click.option(
     "--select",

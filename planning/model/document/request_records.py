@@ -44,7 +44,7 @@ class RequestRecord(Part):
     max_projectors: Number
     max_cameras: Number | None
     max_heads: Number | None
-    target: Literal["dominant", "surface"]
+    target: Literal["dominant", "surface", "outside"]
     pattern: Literal["rings", "dense", "none"]
     dominant_coverage: Share
     coverage: Share

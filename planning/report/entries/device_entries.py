@@ -195,11 +195,15 @@ def mesh_record(mesh: TriangleMesh, shell: MeshShell) -> MeshRecord:
 
 
 def selection_record(
-    mesh: TriangleMesh, region: NDArray[np.int64], interest: Interest | None
+    mesh: TriangleMesh,
+    region: NDArray[np.int64],
+    interest: Interest | None,
+    target: str,
 ) -> SelectionRecord:
     """Return `surface.selection`: what the faces with a region were chosen by."""
     chosen = region >= 0
-    interest = interest or Interest("curvature", chosen)
+    by = "outside" if target == "outside" else "curvature"
+    interest = interest or Interest(by, chosen)
     return SelectionRecord(
         kind=interest.kind,
         source=interest.source,
@@ -218,7 +222,12 @@ def surface_record(ready: Prepared, surface: Surface) -> SurfaceRecord:
         sha256=surface.sha256(),
         curvature_radius_m=ready.curvature_radius_m,
         dominant_share=ready.regions.dominant_share,
-        selection=selection_record(scene.mesh, scene.region, ready.request.interest),
+        selection=selection_record(
+            scene.mesh,
+            scene.region,
+            ready.request.interest,
+            scene.requirements.target,
+        ),
     )
 
 

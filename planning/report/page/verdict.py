@@ -48,7 +48,11 @@ def headline(plan: RigPlan) -> str:
         devices = f"{title_words(document)}, each of them by {devices}"
         if document.stations.kind == "heads":
             devices = f"{title_words(document)}, of {devices_words(plan)},"
-    target = {"dominant": "dominant regions", "surface": "whole surface"}
+    target = {
+        "dominant": "dominant regions",
+        "surface": "whole surface",
+        "outside": "part of the surface that lies outside",
+    }
     sigma = plan.coverage.sigma
     exact = (
         ""

@@ -83,7 +83,8 @@ def route_lines(proof: Certificate) -> list[str]:
 def user_selection(plan: RigPlan) -> SelectionRecord | None:
     """Return `surface.selection` if the user made it; older plans have none."""
     selection = plan.document.surface.selection
-    return None if selection is None or selection.kind == "curvature" else selection
+    made = selection is not None and selection.kind in ("faces", "vertex_weight")
+    return selection if made else None
 
 
 def target_words(plan: RigPlan) -> str:
@@ -94,6 +95,8 @@ def target_words(plan: RigPlan) -> str:
         return f"the {share} of the surface that you chose"
     if plan.requirements.target == "surface":
         return "the whole surface"
+    if plan.requirements.target == "outside":
+        return f"the {share} of the surface that lies outside"
     if coverage.target.area_m2 > 0.995 * coverage.surface.area_m2:
         return "the whole surface, as it is curved alike all over"
     return f"{share} of highest curvature (--target surface: all)"
@@ -103,6 +106,8 @@ def _regions(plan: RigPlan) -> str:
     """Return how many regions there are, and what chose their faces."""
     n, chosen = len(plan.document.regions), user_selection(plan)
     if chosen is None:
+        if plan.requirements.target == "outside":
+            return f"{count_words(n, 'region')} of the outside"
         return count_words(n, "dominant region")
     by = "highest weight" if chosen.kind == "vertex_weight" else "selection"
     source = f" by {chosen.source}" if chosen.source else ""

@@ -26,6 +26,8 @@ from .region_lines import floor_shortfalls
 
 # What accepts the one requirement that a plan misses.
 _ACCEPTS = " accepts this plan"
+# Of the unreachable area, what lies inside to be told how to leave it out.
+_MOST_OF = 0.5
 
 
 @dataclass(frozen=True)
@@ -177,7 +179,7 @@ def _reachable(
             f"workspace{' that mounts can be set to' * stepped}, {percent(least)} is "
             f"required (--min-reachable); "
             f"{area_words(whole - reached)} of {area_words(whole)} can't be{why}.",
-            _steps(relaxations, share, least),
+            (*_other_target(kind, document), *_steps(relaxations, share, least)),
             "; ",
         )
 
@@ -213,6 +215,14 @@ def _inside(document: PlanDocument) -> str:
     hollow = document.own_mesh.shell.kind == "hollow shell"
     where = "lies inside the hollow body" if hollow else "lies in cavities"
     return f"; {area_words(inside)} of it {where}"
+
+
+def _other_target(kind: str, document: PlanDocument) -> Iterator[str]:
+    """What leaves out what lies inside, where most of what is dark does."""
+    areas, inside = document.coverage.target, document.coverage.unreachable_inside_m2
+    dark = areas.area_m2 - areas.reachable_by_projectors_m2
+    if kind == "projector" and inside > _MOST_OF * dark:
+        yield "--target outside leaves out all that lies inside"
 
 
 def _covered(document: PlanDocument, requirements: Requirements) -> Iterator[Shortfall]:

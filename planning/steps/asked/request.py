@@ -63,8 +63,10 @@ def request_of(
             "one: leave them out"
         )
     surface = _single(mesh)
-    if wishes.target == "surface" and selected:
-        raise InputError("the whole surface and a selection both are targets: give one")
+    if wishes.target in ("surface", "outside") and selected:
+        raise InputError(
+            f"target = {wishes.target!r} and a selection both are targets: give one"
+        )
     interest = interest_of(surface, select, weight)
     cut, parent = _cut(surface, clock)
     if interest is not None:
@@ -100,10 +102,10 @@ def _check_single(rig: Rig) -> None:
 
 def _whole(target: str | None, selected: bool) -> TargetName:
     """The target of a body of which only ranges are known: all of it."""
-    if target == "dominant" or selected:
+    if target not in (None, "surface") or selected:
         raise InputError(
             "of a body that is known by its ranges alone the target is the whole "
-            "surface: it has no dominant region and no faces to select"
+            "surface: it has no dominant region, no inside and no faces to select"
         )
     return "surface"
 

@@ -1,5 +1,6 @@
 """What a plan says about the inside of a body: claimed, told, and audited."""
 
+from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
 from typing import Any
@@ -39,8 +40,15 @@ def surface(mesh: TriangleMesh) -> Surface:
     return Surface(mesh, zero, region, np.zeros((n, 3)), none, none, none)
 
 
-def found(mesh: TriangleMesh, document: dict[str, Any]) -> tuple[str, ...]:
-    samples = draw_samples(surface(mesh), "dominant", 20_000, 0)
+def found(
+    mesh: TriangleMesh,
+    document: dict[str, Any],
+    target: str = "dominant",
+    region: np.ndarray | None = None,
+) -> tuple[str, ...]:
+    stated = surface(mesh)
+    stated = stated if region is None else replace(stated, region=region)
+    samples = draw_samples(stated, target, 20_000, 0)
     # Projectors reach the outer wall alone.
     reached = np.linalg.norm(samples.points, axis=1) > 0.0975
     areas = {
@@ -51,7 +59,9 @@ def found(mesh: TriangleMesh, document: dict[str, Any]) -> tuple[str, ...]:
     coverage = Coverage.model_construct(**document["coverage"])
     case: Any = SimpleNamespace(
         plan=SimpleNamespace(
-            coverage=coverage, document=SimpleNamespace(meshes=meshes)
+            coverage=coverage,
+            document=SimpleNamespace(meshes=meshes),
+            requirements=SimpleNamespace(target=target),
         ),
         samples=samples,
         reachable=SimpleNamespace(projectors=reached),
@@ -104,6 +114,21 @@ def test_one_claim_alone_is_not_enough() -> None:
     assert one.startswith("meshes.0.shell.inside_m2: claimed 0")
 
 
+def test_a_target_of_the_outside_is_that_and_no_other() -> None:
+    document = claims(HOLLOW, INNER.area, 0.0)
+    outer = np.arange(len(HOLLOW.faces)) < len(OUTER.faces)
+    height = HOLLOW.face_centroids[:, 2]
+    right = np.where(outer, 0, -1)
+    assert found(HOLLOW, document, "outside", right) == ()
+    # Without a cap of the outer wall, and with one of the inner wall.
+    for wrong in (
+        np.where(outer & (height < 0.085), 0, -1),
+        np.where(outer | (height > 0.08), 0, -1),
+    ):
+        told = found(HOLLOW, document, "outside", wrong)
+        assert "requirements.target: is 'outside'" in told[-1]
+
+
 def test_the_shell_is_told_with_wall_and_share() -> None:
     line = shell_line(mesh_record(HOLLOW, shell_of(HOLLOW)))
     share = 100.0 * INNER.area / HOLLOW.area
@@ -130,8 +155,14 @@ def test_target_out_of_reach_is_said_to_lie_inside(
     document["coverage"] = document["coverage"] | coverage
     document["meshes"] = [document["meshes"][0] | {"shell": {"kind": kind}}]
     document["reconstruction"] = None
-    assert words in shortfalls(RigPlan.from_document(document, plan.surface))[0]
-    coverage["unreachable_inside_m2"] = 0.0
-    document["coverage"] |= coverage
-    plan = RigPlan.from_document(document, plan.surface)
-    assert "lies in" not in shortfalls(plan)[0]
+    told = shortfalls(RigPlan.from_document(document, plan.surface))[0]
+    dark = target["area_m2"] - target["reachable_by_projectors_m2"]
+    assert words in told
+    assert ("--target outside leaves out" in told) == (12.5e-4 > 0.5 * dark)
+    for share, remedy in ((0.6, True), (0.4, False), (0.0, False)):
+        coverage["unreachable_inside_m2"] = share * dark
+        document["coverage"] |= coverage
+        plan = RigPlan.from_document(document, plan.surface)
+        told = shortfalls(plan)[0]
+        assert ("lies in" in told) == (share > 0)
+        assert ("What would help: --target outside leaves out" in told) == remedy

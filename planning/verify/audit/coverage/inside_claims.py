@@ -21,6 +21,8 @@ _RAYS = 160
 _FIRST, _CLEAR = 40, 0.75
 _SIGMAS = 2.5
 _STREAM = 20_151_117
+# Faces are of the target or not as a whole, samples lie anywhere on them.
+_MISJUDGED = 0.03
 _ABOVE = 3e-6
 # The planner's figure of the whole surface rests on at least so many spots.
 _PLANNER_SPOTS = 12_000
@@ -29,7 +31,8 @@ _PLANNER_SPOTS = 12_000
 def audit_inside(case: AuditCase, findings: AuditFindings) -> None:
     """Check the area that lies inside, and how much of it no projector reaches.
 
-    A plan that states neither has nothing to check.
+    A plan that states neither has nothing to check. A target of what lies outside must
+    hold all of that, and nothing that lies inside.
     """
     coverage, shell = case.plan.coverage, case.plan.document.meshes[0].shell
     stated = coverage.model_fields_set | shell.model_fields_set
@@ -60,6 +63,15 @@ def audit_inside(case: AuditCase, findings: AuditFindings) -> None:
         error = np.sqrt(p * (1.0 - p) * (2.0 / len(chosen) + 1.0 / _PLANNER_SPOTS))
         tolerance = (POINT + 3.0 * float(error)) * whole + doubt
         findings.number(key, claimed, area, tolerance)
+    if case.plan.requirements.target == "outside":
+        wrong = (inside == samples.in_target) & ~unsure
+        share = float(samples.weights[wrong].sum() / samples.weights.sum())
+        findings.holds(
+            share <= _MISJUDGED,
+            "requirements.target",
+            f"is 'outside', but of {share:.1%} of the surface the target holds what "
+            "lies inside, or lacks what lies outside",
+        )
 
 
 def _inside(

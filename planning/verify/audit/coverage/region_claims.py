@@ -22,7 +22,8 @@ _ANGLE = 1e-4
 _ERRORS = 3.0
 # Share of a region's area whose normals its cone holds.
 _HELD = 0.98
-_SELECTIONS = ("curvature", "faces", "vertex_weight")
+_OF_NO_FILE = ("curvature", "outside")
+_SELECTIONS = (*_OF_NO_FILE, "faces", "vertex_weight")
 
 
 def audit_margins(case: AuditCase, findings: AuditFindings) -> None:
@@ -125,9 +126,15 @@ def _audit_selection(case: AuditCase, findings: AuditFindings) -> None:
     _audit_faces(selection, surface, surface.region >= 0, findings)
     own = selection.source, selection.sha256, selection.n_removed_by_repair
     findings.holds(
-        selection.kind != "curvature" or own == (None, None, 0),
+        selection.kind not in _OF_NO_FILE or own == (None, None, 0),
         "source",
-        f"{own} is told of faces that were chosen by curvature, of no file",
+        f"{own} is told of faces that were chosen by {selection.kind}, of no file",
+    )
+    target = case.plan.requirements.target
+    findings.holds(
+        (selection.kind == "outside") == (target == "outside"),
+        "kind",
+        f"is {selection.kind!r}, but requirements.target is {target!r}",
     )
     findings.holds(
         selection.kind in _SELECTIONS,
