@@ -148,8 +148,9 @@ def _regions(request: PlanRequest, field: CurvatureField) -> DominantRegions:
 
 def _regions_outside(request: PlanRequest, field: CurvatureField) -> DominantRegions:
     mesh = request.mesh
+    caster = RayCaster(mesh, threads=request.threads)
     outside = request.cache.recall(
-        "outside_faces", (mesh,), lambda: outside_faces(RayCaster(mesh))
+        "outside_faces", (mesh,), lambda: outside_faces(caster)
     )
     if not outside.any():
         raise InputError(
