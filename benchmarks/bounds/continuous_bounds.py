@@ -151,7 +151,7 @@ def stage_of(ready: Prepared, times: int = 1) -> ProjectorStage | None:
     rig = ready.request.rig
     number = times * rig.n_projector_poses
     try:
-        return plan_projectors(ready.scene, ready.templates, number, rounds=1)
+        return plan_projectors(ready.scene, ready.templates, number, rounds=0)
     except InfeasibleLimitsError:
         return None
 

@@ -62,7 +62,8 @@ class Search:
         begun = np.union1d(np.arange(self.n_lattice), before.selection.chosen)
         while True:
             draw += 1
-            first, last = (draw == before.draws + k for k in (1, self.rounds))
+            first = draw == before.draws + 1
+            last = draw >= before.draws + self.rounds
             candidates, selection = self._between(
                 candidates, begun, before.selection.needed, thorough=first
             )
@@ -102,7 +103,7 @@ class Search:
             few = cover.most_covering(len(few), few)[0]
             selection = replace(selection, smallest=few)
         confirmed = False
-        for _ in range(1 if short else self.rounds):
+        for _ in range(min(1, self.rounds) if short else self.rounds):
             chosen = selection.smallest if short else selection.chosen
             confirmed = confirms(candidates, candidates.of(chosen), draw, spare=0.0)
             if confirmed:

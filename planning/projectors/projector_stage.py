@@ -94,7 +94,8 @@ def plan_projectors(
     fresh ones, and where it falls short there, some of them join the samples and the
     cover is solved once more. Floors of regions are looked at last: the fewest that
     light enough of all may meet them, and else are where the search goes on. What fresh
-    samples still lack is added to it.
+    samples still lack is added to it. With no `rounds` of fresh samples the cover is of
+    the first ones, whatever others deny.
 
     Raises:
         NothingLitError: If no candidate lights any sample.

@@ -12,7 +12,6 @@ from support.factories import make_projector, make_requirements, make_scene
 from support.little_work import draw_fewer
 
 from geometry.shapes.primitives import sphere
-from planning.projectors.fewest_projectors import Search
 from planning.projectors.projector_stage import plan_projectors
 from planning.rig.rig import load_rig
 from planning.rings.ring_radii import uniform_radii
@@ -23,8 +22,8 @@ from planning.scene.limits.projector_limits import LIT
 SHARE = 0.9
 
 
-def planned(monkeypatch, most):
-    """The scene and its projectors, of one round."""
+def planned(monkeypatch, most, rounds=1):
+    """The scene and its projectors."""
     draw_fewer(monkeypatch, projectors=60, fresh_projectors=3000)
     mesh, rig = sphere(0.06), load_rig("default", light="parallel")
     wishes = {"target": "surface", "dominant_coverage": SHARE}
@@ -34,7 +33,7 @@ def planned(monkeypatch, most):
     )
     scene = make_scene(mesh, replace(required, projector=limits))
     template = make_projector(rig, uniform_radii(0.2, 0.0035), (0.14, -1.57))
-    return scene, plan_projectors(scene, (template,), 150, rounds=1)
+    return scene, plan_projectors(scene, (template,), 150, rounds=rounds)
 
 
 def share_of_others(scene, stage, projectors):
@@ -54,8 +53,7 @@ def test_projectors_are_added_until_fresh_samples_confirm_the_cover(monkeypatch)
     assert proof.status == "feasible"
     assert proof.candidates.lower_bound < proof.count == proof.needed.count
     # As it was found of the samples alone.
-    monkeypatch.setattr(Search, "completed", lambda _, found: found)
-    scene, few = planned(monkeypatch, 40)
+    scene, few = planned(monkeypatch, 40, rounds=0)
     assert few.certificate.count < proof.count
     assert few.certificate.candidates.lower_bound == proof.candidates.lower_bound
     assert share_of_others(scene, few, few.projectors) < SHARE - 0.02
@@ -65,6 +63,8 @@ def test_too_few_are_told_how_many_fresh_samples_take(monkeypatch):
     _, enough = planned(monkeypatch, 40)
     _, stage = planned(monkeypatch, 2)
     proof = stage.certificate
+    _, of_samples = planned(monkeypatch, 2, rounds=0)
+    assert of_samples.certificate.needed.count < proof.needed.count
     assert len(stage.projectors) == proof.count == 2
     assert proof.status == "infeasible"
     least = proof.needed.lower_bound
