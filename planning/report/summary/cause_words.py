@@ -1,7 +1,8 @@
-"""Causes with their areas, and shares that an option takes, for a person."""
+"""Causes with their areas, and what is said beside them, for a person."""
 
 import math
 
+from planning.model.document.plan_document import PlanDocument
 from planning.model.words import area_words, percent
 from planning.scene.limits.pair_limits import MEASURED_LIMITS
 from planning.scene.limits.projector_limits import PROJECTOR_LIMITS
@@ -9,6 +10,8 @@ from planning.scene.limits.view_pair_limits import VIEW_PAIR_LIMITS
 
 # Causes that take less than this share of what is left aren't told.
 _LEAST_SHARE = 0.01
+# Of the unreachable area, what lies inside to be told how to leave it out.
+_MOST = 0.5
 _CAUSE_WORDS = {
     limit.name: limit.words
     for limit in (*PROJECTOR_LIMITS, *MEASURED_LIMITS, *VIEW_PAIR_LIMITS)
@@ -37,3 +40,22 @@ def rounded_down(share: float) -> str:
     """Return a share to hundredths, or to one digit: few options take a share of 0."""
     places = 2 if not 0.0 < share < 0.01 else -math.floor(math.log10(share))
     return f"{math.floor(10.0**places * share) / 10.0**places:.{places}f}"
+
+
+def inside_words(document: PlanDocument) -> str:
+    """Return how much of what can't be reached lies inside the body."""
+    inside = document.coverage.unreachable_inside_m2
+    if not inside > 0.0:
+        return ""
+    hollow = document.own_mesh.shell.kind == "hollow shell"
+    where = "lies inside the hollow body" if hollow else "lies in cavities"
+    return f"; {area_words(inside)} of it {where}"
+
+
+def leaving_out_inside(document: PlanDocument) -> tuple[str, ...]:
+    """Return what helps where most of what no projector reaches lies inside."""
+    areas, inside = document.coverage.target, document.coverage.unreachable_inside_m2
+    dark = areas.area_m2 - areas.reachable_by_projectors_m2
+    if inside <= _MOST * dark:
+        return ()
+    return ("--target outside leaves out all that lies inside",)

@@ -20,14 +20,18 @@ from planning.scene.limits.pair_limits import MEASURED_LIMITS
 from planning.scene.limits.projector_limits import PROJECTOR_LIMITS
 from planning.scene.limits.view_pair_limits import VIEW_PAIR_LIMITS
 
-from .cause_words import areas_line, causes_line, rounded_down
+from .cause_words import (
+    areas_line,
+    causes_line,
+    inside_words,
+    leaving_out_inside,
+    rounded_down,
+)
 from .devices.device_lines import used_up
 from .region_lines import floor_shortfalls
 
 # What accepts the one requirement that a plan misses.
 _ACCEPTS = " accepts this plan"
-# Of the unreachable area, what lies inside to be told how to leave it out.
-_MOST_OF = 0.5
 
 
 @dataclass(frozen=True)
@@ -154,7 +158,7 @@ def _reachable(
             "lit",
             areas.reachable_by_projectors_m2,
             areas.area_m2,
-            f" reached: {causes_line(unlit, areas.area_m2)}{_inside(document)}",
+            f" reached: {causes_line(unlit, areas.area_m2)}{inside_words(document)}",
             coverage.relaxations,
         ),
         (
@@ -170,6 +174,7 @@ def _reachable(
         if reached >= least * whole:
             continue
         share = reached / whole
+        others = leaving_out_inside(document) if kind == "projector" else ()
         reached_share = percent(share, asked=least)
         mount = requirements.workspace.mount_of(kind)
         stepped = mount is not None and mount.is_stepped
@@ -179,7 +184,7 @@ def _reachable(
             f"workspace{' that mounts can be set to' * stepped}, {percent(least)} is "
             f"required (--min-reachable); "
             f"{area_words(whole - reached)} of {area_words(whole)} can't be{why}.",
-            (*_other_target(kind, document), *_steps(relaxations, share, least)),
+            (*others, *_steps(relaxations, share, least)),
             "; ",
         )
 
@@ -205,24 +210,6 @@ def _unmeasurable(document: PlanDocument) -> str:
             "; why, and what limit would help, isn't computed of heads and turntables"
         )
     return f": {areas_line(document.coverage.unmeasurable_by_cause)}"
-
-
-def _inside(document: PlanDocument) -> str:
-    """How much of what can't be reached lies inside the body."""
-    inside = document.coverage.unreachable_inside_m2
-    if not inside > 0.0:
-        return ""
-    hollow = document.own_mesh.shell.kind == "hollow shell"
-    where = "lies inside the hollow body" if hollow else "lies in cavities"
-    return f"; {area_words(inside)} of it {where}"
-
-
-def _other_target(kind: str, document: PlanDocument) -> Iterator[str]:
-    """What leaves out what lies inside, where most of what is dark does."""
-    areas, inside = document.coverage.target, document.coverage.unreachable_inside_m2
-    dark = areas.area_m2 - areas.reachable_by_projectors_m2
-    if kind == "projector" and inside > _MOST_OF * dark:
-        yield "--target outside leaves out all that lies inside"
 
 
 def _covered(document: PlanDocument, requirements: Requirements) -> Iterator[Shortfall]:
