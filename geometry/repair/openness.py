@@ -14,7 +14,7 @@ import numpy as np
 
 from geometry.arrays import Array, Ints, Mask, lengths
 from geometry.mesh.mesh import TriangleMesh
-from geometry.rays.rays import RayCaster, equal_parts
+from geometry.rays.rays import CHUNK, RayCaster, equal_parts
 
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
 # Fractional parts of multiples of these fill a line, a square evenly (Roberts' R2).
@@ -22,7 +22,6 @@ _R1 = 0.6180339887498949
 _R2 = (0.7548776662466927, 0.5698402909980532)
 # In radii of the object: above the rounding of float32, below any wall.
 _OFFSET = 2e-6
-_MAX_RAYS = 1 << 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +147,10 @@ def _escaped(
     around = rays * _GOLDEN
     escaped = np.empty(len(spots), dtype=np.int64)
     offset = side * _OFFSET * caster.extent
-    for part in equal_parts(len(spots), max(_MAX_RAYS // n_rays, 1)):
+    # Farther than this from a place on the surface there is none of it.
+    beyond = 4.0 * caster.reach
+
+    def look(part: slice) -> None:
         e1, e2, normal = np.moveaxis(spots.frames[part], 1, 0)
         angle = spots.turns[part, None] + around
         along = (
@@ -156,7 +158,13 @@ def _escaped(
             + (radius * np.sin(angle))[..., None] * e2[:, None]
             + (side * height)[:, None] * normal[:, None]
         ).reshape(-1, 3)
-        start = np.repeat(spots.points[part] + offset * normal, len(rays), axis=0)
-        met = caster.met(start, along).reshape(-1, len(rays))
-        escaped[part] = (~met).sum(axis=1)
+        start = caster.local(spots.points[part] + offset * normal)
+        met = caster.blocked_local(
+            np.repeat(start, len(rays), axis=0),
+            along.astype(np.float32),
+            np.full(len(along), beyond, dtype=np.float32),
+        )
+        escaped[part] = (~met).reshape(-1, len(rays)).sum(axis=1)
+
+    caster.share(look, equal_parts(len(spots), max(CHUNK // n_rays, 1)))
     return escaped

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.arrays import Ints, Mask
+from geometry.arrays import Ints, Mask, rows_of
 from planning.model.document.coverage_records import (
     ProjectorMarginal,
     RegionCoverage,
@@ -79,7 +79,7 @@ def _audit_centre(
     weights = mesh.face_areas[faces]
     if region.centre_m is None or not weights.sum() > 0.0:
         return
-    middle = weights @ mesh.corners[faces].mean(axis=1) / weights.sum()
+    middle = weights @ rows_of(mesh.face_centroids, faces) / weights.sum()
     whose = "the mean of its faces' centroids"
     findings.same("centre_m", region.centre_m, middle, whose, ROUNDING * mesh.radius)
 

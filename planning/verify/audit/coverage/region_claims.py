@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from geometry.arrays import Array, Mask
+from geometry.arrays import Array, Mask, rows_of
 from planning.model.document.coverage_records import RegionRecord
 from planning.model.document.input_records import SelectionRecord
 from planning.model.requirements import ProjectorLimits
@@ -171,13 +171,14 @@ def _audit_size(case: AuditCase, region: RegionRecord, findings: AuditFindings) 
     surface, mesh = case.plan.surface, case.plan.surface.mesh
     faces = surface.region == region.id
     _audit_faces(region, surface, faces, findings)
-    mean = mesh.face_areas[faces] @ mesh.face_normals[faces]
+    areas, normals = mesh.face_areas[faces], rows_of(mesh.face_normals, faces)
+    mean = areas @ normals
     length = float(np.linalg.norm(mean))
-    if length > ROUNDING * float(mesh.face_areas[faces].sum()):
+    if length > ROUNDING * float(areas.sum()):
         whose = "the area-weighted mean of its faces' normals"
         claimed = region.mean_normal
         findings.same("mean_normal", claimed, mean / length, whose, _ANGLE)
-        _audit_cone(region, mesh.face_normals[faces], mesh.face_areas[faces], findings)
+        _audit_cone(region, normals, areas, findings)
 
 
 def _audit_cone(
