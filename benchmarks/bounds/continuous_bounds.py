@@ -3,6 +3,7 @@
 Usage: python -m benchmarks.bounds.continuous_bounds [NAME ...] [--lights parallel
     diverging]
        [--shares 0.9 0.95] [--tangents 0 40] [--efforts default prove] [--more N]
+       [--target dominant|surface|outside]
 
 For the sample and the twelve meshes in `../shared/data/meshes` (those named, if any):
 `count / bound over candidates / bound over all poses` for each light, required share
@@ -19,6 +20,7 @@ import time
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 from support import shared_meshes
@@ -35,7 +37,7 @@ from planning.projectors.proved_projectors import prove_fewest
 from planning.proofs.all_poses import Effort
 from planning.proofs.projector_bound import DEFAULT, PROVE
 from planning.report.partial_plan import PlanRequest, Prepared
-from planning.rig.wishes import Wishes
+from planning.rig.wishes import TargetName, Wishes
 from planning.steps.prepare import prepared
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -63,7 +65,7 @@ def main() -> int:
         for light in given.lights:
             cells: list[tuple[str, int]] = []
             for share, tangent in cases:
-                ready = ready_for(mesh, light, up, share, tangent)
+                ready = ready_for(mesh, light, up, share, tangent, target=given.target)
                 if given.more > 1:
                     cells.append(_with_more(ready, given.more))
                 else:
@@ -92,6 +94,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--shares", nargs="+", type=float, default=(0.9, 0.95))
     parser.add_argument("--tangents", nargs="+", type=float, default=(0.0, 40.0))
     parser.add_argument("--efforts", nargs="+", default=["default"], choices=EFFORTS)
+    parser.add_argument("--target", choices=get_args(TargetName))
     parser.add_argument("--more", type=int, default=1, help="times the candidates")
     return parser.parse_args()
 
@@ -115,6 +118,7 @@ def ready_for(
     tangent: float | None,
     *,
     devices: int | None = None,
+    target: TargetName | None = None,
 ) -> Prepared:
     """Return a mesh ready for planning.
 
@@ -126,6 +130,7 @@ def ready_for(
         tangent: Least tangent angle in degrees; None: the rig's.
         devices: Projectors and cameras at most, and as much measured as they can;
             None: as many as needed.
+        target: What must be covered; None: the dominant regions.
     """
     wishes = Wishes(
         max_projectors=devices or MANY,
@@ -133,6 +138,7 @@ def ready_for(
         dominant_coverage=share,
         coverage=1.0 if devices else None,
         up=up,
+        target=target,
     )
     order = PlanRequest(
         mesh, load_rig("default", light), wishes, threads=os.cpu_count() or 1

@@ -1,7 +1,7 @@
 """What multipliers can prove at most: the linear program over poses.
 
 Usage: python -m benchmarks.bounds.pose_program [NAME ...] [--shares 0.9 0.95]
-    [--rounds N]   (ringrig installed, a checkout)
+    [--rounds N] [--target dominant|surface|outside]   (ringrig installed, a checkout)
 
 A bound over all poses that multipliers of the samples prove is at most the fractional
 cover of real poses::
@@ -17,6 +17,7 @@ its cells; it may still fall. For diverging light, a tangent limit of 40 degrees
 
 import argparse
 import sys
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,7 @@ from planning.projectors.candidate_set import CandidateSource
 from planning.projectors.projector_stage import ProjectorStage
 from planning.proofs.quotas import required_samples
 from planning.report.partial_plan import Prepared
+from planning.rig.wishes import TargetName
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
 
@@ -51,6 +53,7 @@ def main() -> int:
     parser.add_argument("names", nargs="*", metavar="NAME")
     parser.add_argument("--shares", nargs="+", type=float, default=(0.9, 0.95))
     parser.add_argument("--rounds", type=int, default=10)
+    parser.add_argument("--target", choices=get_args(TargetName))
     given = parser.parse_args()
     print(f"{machine()}\n")
     print("| mesh | share | count | over candidates | over more poses | poses |")
@@ -59,7 +62,9 @@ def main() -> int:
     for path, options, up in jobs(given.names):
         mesh, _ = cut_for_curvature(load_mesh(path, **options))
         for share in given.shares:
-            ready = ready_for(mesh, "diverging", up, share, _TANGENT_DEG)
+            ready = ready_for(
+                mesh, "diverging", up, share, _TANGENT_DEG, target=given.target
+            )
             stage = stage_of(ready)
             if stage is None:
                 continue

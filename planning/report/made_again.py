@@ -75,7 +75,6 @@ def made_again(plan: RigPlan, *, threads: int) -> dict[str, Any]:
     regions = _regions(plan, scene, field)
     parts: dict[str, Any] = {
         "coverage": _coverage(plan, scene, devices, claims),
-        "regions": entries.region_records(scene.mesh, regions, claims),
         "projectors": entries.projector_records(
             among, devices, known if len(known) == len(rings) else None, claims
         ),
@@ -88,6 +87,9 @@ def made_again(plan: RigPlan, *, threads: int) -> dict[str, Any]:
             for group in overlap_components(claims.measured_by)
         ),
     }
+    if np.array_equal(regions.face_region, scene.region):
+        # Else the digest of the surface says that others come out.
+        parts["regions"] = entries.region_records(scene.mesh, regions, claims)
     if document.ranges is None:
         # Spread of what is known by ranges takes their file.
         samples = claims.target_samples.samples

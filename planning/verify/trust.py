@@ -104,9 +104,9 @@ UNAUDITED_OF_CHECK = {
     ),
     "likely causes of what the check missed": ("reconstruction.failures",),
 }
-# Of the mesh file, which isn't part of the plan.
 # By what faces are chosen that no user chose.
 _FOUND = {"curvature": "curvature", "outside": "what lies outside"}
+# Of the mesh file, which isn't part of the plan.
 _OF_FILE = "the mesh file, its digest, size and repairs (meshes): give --mesh {path}"
 
 

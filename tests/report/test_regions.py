@@ -257,7 +257,7 @@ def test_every_region_is_shown_on_demand(plan, handmade, tmp_path):
     shown = CliRunner().invoke(commands, ["show", str(path), "--regions"])
     assert shown.exit_code == 0
     heading, *lines = shown.stdout.rstrip("\n").splitlines()
-    assert heading.startswith("REGIONS: every dominant region")
+    assert heading.startswith("REGIONS: every region")
     assert lines == region_table(plan)
     first, second = lines[-2:]
     assert first.split()[:3] == ["0", "65.11", "72"]

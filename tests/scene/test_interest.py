@@ -405,9 +405,23 @@ def test_a_plan_for_the_outside_verifies_and_another_target_does_not(
         stated = replace(outside, surface=replace(outside.surface, region=region))
         again = made_again(stated, threads=2)["surface"]["sha256"]
         assert (again == stated.surface.sha256()) == same
-    for kind, told in (("faces", "outside"), ("outside", "dominant")):
+    # Other regions come out where it says that curvature chose them.
+    document = outside.to_document()
+    document["requirements"]["target"] = "dominant"
+    document["surface"]["selection"] = None
+    plan = RigPlan.from_document(document, outside.surface)
+    again = made_again(plan, threads=2)
+    assert "regions" not in again
+    assert again["surface"]["sha256"] != plan.document.surface.sha256
+    for kind, told in (
+        ("faces", "outside"),
+        ("outside", "dominant"),
+        ("curvature", "outside"),
+    ):
         document = outside.to_document()
         document["surface"]["selection"]["kind"] = kind
+        if kind == "curvature":
+            document["surface"]["selection"] = None
         document["requirements"]["target"] = told
         plan = RigPlan.from_document(document, outside.surface)
         found = audit_plan(plan, n_samples=1000).failures

@@ -106,6 +106,40 @@ def torus(
     return TriangleMesh(vertices.reshape(-1, 3), faces)
 
 
+def flipped(mesh: TriangleMesh) -> TriangleMesh:
+    return TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
+
+
+def turned(profile: np.ndarray, around: int = 96) -> TriangleMesh:
+    """Revolve a closed profile (radius, z), clockwise about the material, about z.
+
+    Points on the axis become one vertex, so that the body is closed.
+    """
+    n = len(profile)
+    phi = np.arange(around) * (2.0 * np.pi / around)
+    ring = np.stack([np.cos(phi), np.sin(phi)], axis=1)
+    points = np.empty((n, around, 3))
+    points[..., :2] = profile[:, None, :1] * ring
+    points[..., 2] = profile[:, 1:]
+    vertices = points.reshape(-1, 3)
+    i, k = np.meshgrid(np.arange(n), np.arange(around), indexing="ij")
+    after_i, after_k = (i + 1) % n, (k + 1) % around
+    a, b = i * around + k, i * around + after_k
+    c, d = after_i * around + after_k, after_i * around + k
+    quads = [np.stack(x, axis=-1).reshape(-1, 3) for x in ((a, c, b), (a, d, c))]
+    faces = np.concatenate(quads)
+    vertices, where = np.unique(vertices.round(12) + 0.0, axis=0, return_inverse=True)
+    faces = where.reshape(-1)[faces]
+    whole = (
+        (faces[:, 0] != faces[:, 1])
+        & (faces[:, 1] != faces[:, 2])
+        & (faces[:, 2] != faces[:, 0])
+    )
+    mesh = TriangleMesh(vertices, faces[whole])
+    volume = np.linalg.det(mesh.corners).sum() / 6.0
+    return mesh if volume > 0 else flipped(mesh)
+
+
 def joined(*meshes: TriangleMesh) -> TriangleMesh:
     """Return several meshes as one; bodies that touch keep vertices of their own."""
     starts = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])

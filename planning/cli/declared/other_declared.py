@@ -26,7 +26,7 @@ _SECTIONS = {
     "coverage": "Areas that are lit and measured, and what is left out.",
     "proofs": "What was proved of the numbers of devices.",
     "marginal": "What one device more or fewer would change.",
-    "regions": "Every dominant region, where it lies, what of it is measured.",
+    "regions": "Every region, where it lies, what of it is measured.",
     "rings": "How circles are spaced, and what becomes of them.",
     "check": "The reconstruction from pixels.",
     "cost": "How long a scan takes; eq. (8).",

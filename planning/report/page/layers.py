@@ -162,7 +162,7 @@ def _regions(plan: RigPlan, region: NDArray[np.int64], areas: Array) -> Layer:
     for record in plan.document.regions:
         colour = _APART[record.id % len(_APART)]
         classes.append((record.id, f"region {record.id}", colour))
-    return _classes("region", "dominant region", codes, classes, areas)
+    return _classes("region", "region", codes, classes, areas)
 
 
 def _classes(

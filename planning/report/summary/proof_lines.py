@@ -96,6 +96,8 @@ def target_words(plan: RigPlan) -> str:
     if plan.requirements.target == "surface":
         return "the whole surface"
     if plan.requirements.target == "outside":
+        if coverage.target.area_m2 > 0.9995 * coverage.surface.area_m2:
+            return "the whole surface, of which nothing lies inside"
         return f"the {share} of the surface that lies outside"
     if coverage.target.area_m2 > 0.995 * coverage.surface.area_m2:
         return "the whole surface, as it is curved alike all over"

@@ -89,7 +89,7 @@ SECTIONS = (
     ),
     Section(
         "regions",
-        "every dominant region, where it lies, and what of it is lit and measured.",
+        "every region, where it lies, and what of it is lit and measured.",
         region_table,
     ),
     Section(

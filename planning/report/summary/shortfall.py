@@ -209,7 +209,8 @@ def _unmeasurable(document: PlanDocument) -> str:
         return (
             "; why, and what limit would help, isn't computed of heads and turntables"
         )
-    return f": {areas_line(document.coverage.unmeasurable_by_cause)}"
+    causes = document.coverage.unmeasurable_by_cause
+    return f": {areas_line(causes)}" if causes else ""
 
 
 def _covered(document: PlanDocument, requirements: Requirements) -> Iterator[Shortfall]:

@@ -121,6 +121,13 @@ def audit_regions(case: AuditCase, findings: AuditFindings) -> None:
 def _audit_selection(case: AuditCase, findings: AuditFindings) -> None:
     """Check what is said of the faces that were chosen; who chose them is no claim."""
     selection, surface = case.plan.document.surface.selection, case.plan.surface
+    kind = "curvature" if selection is None else selection.kind
+    target = case.plan.requirements.target
+    findings.holds(
+        (kind == "outside") == (target == "outside"),
+        "kind",
+        f"is {kind!r}, but requirements.target is {target!r}",
+    )
     if selection is None:
         return
     _audit_faces(selection, surface, surface.region >= 0, findings)
@@ -129,12 +136,6 @@ def _audit_selection(case: AuditCase, findings: AuditFindings) -> None:
         selection.kind not in _OF_NO_FILE or own == (None, None, 0),
         "source",
         f"{own} is told of faces that were chosen by {selection.kind}, of no file",
-    )
-    target = case.plan.requirements.target
-    findings.holds(
-        (selection.kind == "outside") == (target == "outside"),
-        "kind",
-        f"is {selection.kind!r}, but requirements.target is {target!r}",
     )
     findings.holds(
         selection.kind in _SELECTIONS,
