@@ -1,7 +1,7 @@
 """Plan random rigs and meshes: every plan that is written must verify.
 
 Usage: python -m benchmarks.plans.honest [COUNT] [SEED] [--from NUMBER] [--only NUMBER]
-    [--keep FOLDER]   (from a checkout)
+    [--keep FOLDER] [--outside]   (from a checkout)
 
 `tests/support/drawn_jobs.py` draws a mesh or two, a rig file and the words of a command
 from SEED and a number; nothing is damaged. `tests/support/drawn_plans.py` plans each as
@@ -11,7 +11,8 @@ made them, bounds over candidates; of some the pixels, the bounds over all poses
 whole plan again. A plan is *met* (exit 0) or *short* (exit 1, and says of what); no
 claim of either may be false. What is *refused* is so in a line for each fault. Anything
 else escaped: it is listed with its number, and `--only` makes it again. Prints how many
-ended how; returns 1 if anything escaped.
+ended how; returns 1 if anything escaped. With `--outside` meshes are hollow, and the
+target is what lies outside.
 """
 
 import argparse
@@ -39,6 +40,7 @@ def main() -> int:
     parser.add_argument("--from", type=int, default=0, dest="first")
     parser.add_argument("--only", type=int)
     parser.add_argument("--keep", type=Path)
+    parser.add_argument("--outside", action="store_true")
     asked = parser.parse_args()
     numbers = range(asked.first, asked.first + asked.count)
     if asked.only is not None:
@@ -46,7 +48,8 @@ def main() -> int:
     ended, extra = Counter[tuple[str, str]](), Counter[str]()
     escaped, begin = list[str](), time.perf_counter()
     for number in numbers:
-        job, began = draw_job(asked.seed, number), time.perf_counter()
+        job = draw_job(asked.seed, number, outside=asked.outside)
+        began = time.perf_counter()
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name) if asked.keep is None else asked.keep / str(number)
             folder.mkdir(parents=True, exist_ok=True)

@@ -48,12 +48,15 @@ class Job:
     replanned: bool = False
 
 
-def draw_job(seed: int, number: int) -> Job:
-    """Return the job of a number, the same every time."""
-    random = Random(f"{seed} {number}")
+def draw_job(seed: int, number: int, *, outside: bool = False) -> Job:
+    """Return the job of a number, the same every time.
+
+    For the `outside` meshes are made hollow, and what doesn't lie inside is asked for.
+    """
+    random = Random(f"{seed} {number}{' outside' * outside}")
     kind = random.choices(list(_KINDS), list(_KINDS.values()))[0]
     job = Job(kind)
-    meshes = [_mesh(random)]
+    meshes = [_hollow(random, _mesh(random)) if outside else _mesh(random)]
     if kind == "family":
         meshes.append(_alike(random, meshes[0]))
     for k, mesh in enumerate(meshes):
@@ -62,13 +65,17 @@ def draw_job(seed: int, number: int) -> Job:
     tables = draw_rig(random, kind)
     job.files["rig.toml"] = "".join(f"{k} = {_toml(v)}\n" for k, v in tables.items())
     job.words += ["--rig", "rig.toml"]
+    if outside:
+        job.words += ["--target", "outside"]
     if kind == "evaluate":
         job.words = ["evaluate", *job.words]
-        _draw_target(random, job, meshes[0], 0.0)
+        if not outside:
+            _draw_target(random, job, meshes[0], 0.0)
         job.words += ["--poses", "poses.csv"]
         job.files["poses.csv"] = _poses(random)
     else:
-        _draw_target(random, job, meshes[0], 0.25 if len(meshes) == 1 else 0.0)
+        if not outside:
+            _draw_target(random, job, meshes[0], 0.25 if len(meshes) == 1 else 0.0)
         _draw_words(random, job)
     job.little, job.checked = random.random() < 0.15, random.random() < 0.12
     job.proofs, job.replanned = random.random() < 0.06, random.random() < 0.06
@@ -92,6 +99,21 @@ def _mesh(random: Random) -> TriangleMesh:
     if random.random() < 0.3:
         vertices += rng.uniform(-0.3, 0.3, 3)
     return TriangleMesh(vertices, mesh.faces)
+
+
+def _hollow(random: Random, mesh: TriangleMesh) -> TriangleMesh:
+    """The mesh with an inner wall, and often a mouth through both."""
+    middle = mesh.vertices.mean(axis=0)
+    inner = middle + random.uniform(0.7, 0.97) * (mesh.vertices - middle)
+    axis = np.array([random.gauss(0.0, 1.0) for _ in range(3)])
+    mouth = random.choice([0.0, random.uniform(15.0, 70.0)])
+    parts: list[TriangleMesh] = []
+    for vertices, faces in ((mesh.vertices, mesh.faces), (inner, mesh.faces[:, ::-1])):
+        towards = vertices[faces].mean(axis=1) - middle
+        lengths = np.linalg.norm(towards, axis=1) * np.linalg.norm(axis)
+        kept = towards @ axis <= lengths * np.cos(np.radians(mouth))
+        parts.append(TriangleMesh(vertices, faces[kept]))
+    return TriangleMesh.joined(parts)
 
 
 def _alike(random: Random, mesh: TriangleMesh) -> TriangleMesh:
