@@ -1,22 +1,23 @@
 """Time the main job from mesh to files, and again with another requirement.
 
-Usage: python -m benchmarks.plans.speed [--runs N] [--others K] [NAME ...]   (ringrig
-    installed, a checkout)
+Usage: python -m benchmarks.plans.speed [--runs N] [--others K] [--words WORDS]
+    [NAME ...]   (ringrig installed, a checkout)
 
 Plans the sample, a sample head of 100,000 faces and, where `../shared/data/meshes`
 exists, the face scan and the scan of 1.16 million faces (those named, if any) with the
-default rig and at most three projectors. The first run has an empty cache; the second
-asks for another coverage, accuracy or number of cameras and has the cache that the
-first left (the first K of these three, all by default). Prints the median over N runs
-(5) of wall time, processor time over all threads and peak memory; of the second what
-part of the first's wall time it took, until the plan stands and until it is checked and
-all is written; and whether its plan is that of a run without a cache, but for what a
-run says of itself. Returns 1 if one isn't.
+default rig and at most three projectors, or as WORDS say instead. The first run has an
+empty cache; the second asks for another coverage, accuracy or number of cameras and has
+the cache that the first left (the first K of these three, all by default). Prints the
+median over N runs (5) of wall time, processor time over all threads and peak memory; of
+the second what part of the first's wall time it took, until the plan stands and until
+it is checked and all is written; and whether its plan is that of a run without a cache,
+but for what a run says of itself. Returns 1 if one isn't.
 """
 
 import argparse
 import json
 import os
+import shlex
 import shutil
 import subprocess
 import sys
@@ -59,10 +60,12 @@ def main() -> int:
     parser = argparse.ArgumentParser()
     parser.add_argument("--runs", type=int, default=_RUNS)
     parser.add_argument("--others", type=int, default=len(_OTHERS))
+    parser.add_argument("--words", default="", help="of every run, quoted as one")
     parser.add_argument("names", nargs="*", default=_NAMES)
     asked = parser.parse_args()
-    runs, others = asked.runs, _OTHERS[: asked.others]
-    print(f"{machine()}; medians of {runs} runs\n")
+    always = tuple(shlex.split(asked.words))
+    questions = [(*always, *words) for words in ((), *_OTHERS[: asked.others])]
+    print(f"{machine()}; medians of {asked.runs} runs\n")
     print(
         "| mesh | asked | stands [s] | ends [s] | CPU [s] | peak [GB] | of the first "
         "| same plan |\n" + 8 * "|---" + "|"
@@ -72,20 +75,21 @@ def main() -> int:
         with tempfile.TemporaryDirectory() as folder:
             place = Path(folder)
             if (mesh := _mesh(name, place)) is not None:
-                differ |= _told_of(name, mesh, place, runs, others)
+                differ |= _told_of(name, mesh, place, asked.runs, questions)
     return int(differ)
 
 
 def _told_of(
-    name: str, mesh: Path, place: Path, runs: int, others: Sequence[Sequence[str]]
+    name: str, mesh: Path, place: Path, runs: int, questions: Sequence[Sequence[str]]
 ) -> bool:
     """Print the rows of a mesh; return whether a cache changed a plan."""
+    begun, *others = questions
     left, cache = place / "left", place / "cache"
     firsts: list[Run] = []
     for _ in range(runs):
         shutil.rmtree(left, ignore_errors=True)
-        firsts.append(_run(mesh, place, (), left))
-    _row(name, "", firsts, (), "")
+        firsts.append(_run(mesh, place, begun, left))
+    _row(name, " ".join(begun), firsts, (), "")
     differ = False
     for words in others:
         seconds: list[Run] = []
