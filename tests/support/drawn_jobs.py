@@ -103,8 +103,13 @@ def _mesh(random: Random) -> TriangleMesh:
 
 def _hollow(random: Random, mesh: TriangleMesh) -> TriangleMesh:
     """The mesh with an inner wall, and often a mouth through both."""
-    middle = mesh.vertices.mean(axis=0)
-    inner = middle + random.uniform(0.7, 0.97) * (mesh.vertices - middle)
+    middle, wall = mesh.vertices.mean(axis=0), random.uniform(0.01, 0.1) * mesh.radius
+    # Not smaller about the middle: a plane through it would be its own inner wall.
+    normals = np.zeros_like(mesh.vertices)
+    each = mesh.face_areas[:, None] * mesh.face_normals
+    np.add.at(normals, mesh.faces.ravel(), np.repeat(each, 3, axis=0))
+    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-30)[:, None]
+    inner = mesh.vertices - wall * normals
     axis = np.array([random.gauss(0.0, 1.0) for _ in range(3)])
     mouth = random.choice([0.0, random.uniform(15.0, 70.0)])
     parts: list[TriangleMesh] = []
