@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planning.model.devices.planned import PlannedCamera, PlannedProjector
-from planning.model.document.certificates import CamerasBy, Certificate
+from planning.model.document.certificates import CamerasBy, Certificate, RouteCounts
 from planning.model.document.ring_records import AxisTaken
 from planning.proofs.selection import Selection
 from planning.rings.axis_moves import move_ring_axes
@@ -139,13 +139,27 @@ def follow_cameras(
         scene = scene.among(projectors)
         cover = cover_again(scene, moved, stage.cover, by)
         if proves_as_much(cover.selection, stage.certificate, len(cameras)):
-            # Where fewer are allowed than are needed, other axes may need another count
-            # than the routes did.
-            needed = stage.certificate.needed.count
-            as_told = cover.selection.needed == needed
+            # Other axes may need another count than the routes did.
+            as_told = cover.selection.needed == stage.certificate.needed.count
+            as_told &= _may_follow(cover.selection, stage.routes)
             proved = camera_stage(scene, cover, stage.routes if as_told else None)
             return CameraSolution(moved, proved)
     return CameraSolution(tuple(projectors), stage)
+
+
+def _may_follow(new: Selection, routes: RouteCounts | None) -> bool:
+    """Return whether what routes need is told of a selection, too.
+
+    One more than they need may have come in for fresh samples; that many may be the
+    fewest for the axes as they are now, and the routes were of others.
+    """
+    if routes is None:
+        return True
+    counts = {"cover": routes.cover, "paper": routes.paper}
+    least = min((n for n in counts.values() if n is not None), default=new.needed)
+    taken = counts[routes.taken]
+    told = taken is None or new.needed == taken or new.status == "feasible"
+    return told and min(new.lower_bound, new.needed) <= least
 
 
 def proves_as_much(new: Selection, old: Certificate, count: int) -> bool:

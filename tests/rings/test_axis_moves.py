@@ -355,6 +355,11 @@ def test_the_proof_is_of_the_axes_that_are_kept(ball, moved):
     followed = follow_cameras(scene, projectors, cover.cameras, other)
     assert followed.stage is not other
     assert followed.stage.routes is None
+    # One more than they need came in for fresh samples, and is the fewest now.
+    fewer = replace(stage, routes=told.changed(cover=count - 1))
+    followed = follow_cameras(scene, projectors, cover.cameras, fewer)
+    assert followed.stage.certificate.candidates.lower_bound == count
+    assert followed.stage.routes is None
     # Another number of cameras than is proved: axes and proof stay.
     more = follow_cameras(scene, projectors, (*cover.cameras, cover.cameras[0]), stage)
     assert more.stage is stage
