@@ -460,5 +460,5 @@ def test_a_hollow_bust_exits_1_and_says_how_much_why_and_what_helps(tmp_path):
     assert "can be lit from anywhere" in done.stdout
     assert "shadowed" in done.stdout
     assert done.stdout.startswith("NOT MET  ")
-    assert "HELPS    " in done.stdout
+    assert "HELPS    --target outside leaves out all that lies inside" in done.stdout
     assert (tmp_path / "plan.json").exists()
