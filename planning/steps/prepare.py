@@ -148,9 +148,10 @@ def _regions(request: PlanRequest, field: CurvatureField) -> DominantRegions:
 
 def _regions_outside(request: PlanRequest, field: CurvatureField) -> DominantRegions:
     mesh = request.mesh
-    caster = RayCaster(mesh, threads=request.threads)
     outside = request.cache.recall(
-        "outside_faces", (mesh,), lambda: outside_faces(caster)
+        "outside_faces",
+        (mesh,),
+        lambda: outside_faces(RayCaster(mesh, threads=request.threads)),
     )
     if not outside.any():
         raise InputError(
