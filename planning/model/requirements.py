@@ -264,8 +264,7 @@ class Requirements:
         coverage: Measured area / area reachable by cameras, on the target.
         dominant_coverage: Lit area / area reachable by projectors, on the target.
         min_reachable: Area reachable by projectors / target area.
-        target: `dominant` regions, which are chosen faces where a user chose them, the
-            whole `surface`, or what of it lies `outside`.
+        target: `dominant` or chosen faces, the whole `surface`, or its `outside`.
         pattern: `rings`, a `dense` code of every pixel, or `none`, cameras alone.
         existing: Devices that stand already and are part of every plan.
         region_coverage: Floor of lit / reachable and of measured / reachable in each.
