@@ -134,11 +134,11 @@ def _coverage(
 
 def _regions(plan: RigPlan, scene: Scene, field: CurvatureField) -> DominantRegions:
     """The regions of the surface: of its curvature, its outside, or chosen faces."""
-    mesh, selection = scene.mesh, plan.document.surface.selection
-    if selection is None or selection.kind == "curvature":
+    mesh, by = scene.mesh, plan.document.faces_chosen_by
+    if by == "curvature":
         return dominant_regions(mesh, field)
     chosen = plan.surface.in_dominant
-    if selection.kind == "outside":
+    if by == "outside":
         chosen = outside_faces(scene.visibility.caster)
     return regions_of_faces(mesh, field, chosen)
 

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import fields, replace
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ from planning.model.requirements import (
 from planning.scene.workspace.zone_conflicts import check_zones
 
 from .rig_tables import LimitsTable, RequirementsTable, RigTable
-from .wishes import MOST_VIEWS, Pattern, Wishes, check_counts, views_alone
+from .wishes import MOST_VIEWS, Pattern, TargetName, Wishes, check_counts, views_alone
 
 _Limits = TypeVar("_Limits", ProjectorLimits, CameraLimits, TriangulationLimits)
 
@@ -55,7 +55,7 @@ def build_requirements(
     """
     shares = table.requirements
     target = wishes.target or "dominant"
-    _check_choice("target", target, ("dominant", "surface", "outside"))
+    _check_choice("target", target, get_args(TargetName))
     _check_choice("pattern", wishes.pattern, ("rings", "dense", "none"))
     check_counts(wishes)
     alone = wishes.pattern == "none"

@@ -203,8 +203,8 @@ def of_surface(plan: RigPlan, claims_held: str) -> tuple[str, ...]:
 
     Not again computed, it is the planner's word; and chosen faces are the user's.
     """
-    surface, requirements = plan.document.surface, plan.requirements
-    kind = "curvature" if surface.selection is None else surface.selection.kind
+    requirements = plan.requirements
+    kind = plan.document.faces_chosen_by
     lines: list[str] = []
     found = kind in _FOUND
     if not found or claims_held != EXACTLY:

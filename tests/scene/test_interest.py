@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.plain_shapes import box
+from support.plain_shapes import box, flipped, joined
 
 from geometry.curvature.curvature import principal_curvatures
 from geometry.files.readers import load_mesh
@@ -22,6 +22,8 @@ from planning.report.made_again import made_again
 from planning.report.summary.summary import summary
 from planning.scene.interest import interest_of, read_selection, read_weight
 from planning.verify.audit.audit import audit_plan
+from planning.verify.held_figures import EXACTLY
+from planning.verify.trust import of_surface
 
 # Side of the box that is painted: +z, of six with 4 x 4 quads each.
 TOP, N = 4, 4
@@ -361,10 +363,7 @@ def test_a_plan_for_a_selection_verifies_and_a_changed_one_does_not(
 def outside(with_little_work) -> RigPlan:
     """Of a ball in whose middle there is another one, all that can be seen."""
     outer, inner = sphere(0.05, subdivisions=3), sphere(0.03, subdivisions=3)
-    hollow = TriangleMesh(
-        np.concatenate([outer.vertices, inner.vertices]),
-        np.concatenate([outer.faces, inner.faces[:, ::-1] + len(outer.vertices)]),
-    )
+    hollow = joined(outer, flipped(inner))
     with with_little_work():
         return plan_rig(
             hollow,
@@ -399,6 +398,9 @@ def test_a_plan_for_the_outside_verifies_and_another_target_does_not(
     outside: RigPlan,
 ) -> None:
     assert verify_plan(outside, seed=5, check_pixels=False).failures == ()
+    assert of_surface(outside, EXACTLY) == ()
+    (told,) = [line for line in of_surface(outside, "") if "target" in line]
+    assert told.endswith("chosen by what lies outside, says surface.selection")
     differs = outside.surface.region.copy()
     differs[np.flatnonzero(differs >= 0)[0]] = -1
     for region, same in ((outside.surface.region, True), (differs, False)):

@@ -65,17 +65,16 @@ def draw_job(seed: int, number: int, *, outside: bool = False) -> Job:
     tables = draw_rig(random, kind)
     job.files["rig.toml"] = "".join(f"{k} = {_toml(v)}\n" for k, v in tables.items())
     job.words += ["--rig", "rig.toml"]
+    own = 0.25 if kind != "evaluate" and len(meshes) == 1 else 0.0
     if outside:
         job.words += ["--target", "outside"]
+    else:
+        _draw_target(random, job, meshes[0], own)
     if kind == "evaluate":
         job.words = ["evaluate", *job.words]
-        if not outside:
-            _draw_target(random, job, meshes[0], 0.0)
         job.words += ["--poses", "poses.csv"]
         job.files["poses.csv"] = _poses(random)
     else:
-        if not outside:
-            _draw_target(random, job, meshes[0], 0.25 if len(meshes) == 1 else 0.0)
         _draw_words(random, job)
     job.little, job.checked = random.random() < 0.15, random.random() < 0.12
     job.proofs, job.replanned = random.random() < 0.06, random.random() < 0.06

@@ -138,6 +138,12 @@ class PlanDocument(Part):
     timings_s: dict[str, float]
 
     @property
+    def faces_chosen_by(self) -> str:
+        """What chose the faces of the regions; older plans don't say that it bent."""
+        selection = self.surface.selection
+        return "curvature" if selection is None else selection.kind
+
+    @property
     def own_mesh(self) -> MeshRecord:
         """The mesh that the plan speaks of: of a family's that of its worst member."""
         worst = 0 if self.family is None else self.family.worst

@@ -56,8 +56,6 @@ def leaving_out_inside(document: PlanDocument) -> tuple[str, ...]:
     """Return what helps where most of what no projector reaches lies inside."""
     areas, inside = document.coverage.target, document.coverage.unreachable_inside_m2
     dark = areas.area_m2 - areas.reachable_by_projectors_m2
-    selection = document.surface.selection
-    given = selection is not None and selection.kind != "curvature"
-    if given or inside <= _MOST * dark:
+    if document.faces_chosen_by != "curvature" or inside <= _MOST * dark:
         return ()
     return ("--target outside leaves out all that lies inside",)

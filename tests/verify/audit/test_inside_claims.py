@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.plain_shapes import turned
+from support.plain_shapes import flipped, joined, turned
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import RayCaster
@@ -26,10 +26,7 @@ from planning.verify.audit.coverage.inside_claims import audit_inside
 from planning.verify.audit.predicates.occlusion import Shadow
 
 OUTER, INNER = sphere(0.1, subdivisions=3), sphere(0.096, subdivisions=3)
-HOLLOW = TriangleMesh(
-    np.concatenate([OUTER.vertices, INNER.vertices]),
-    np.concatenate([OUTER.faces, INNER.faces[:, ::-1] + len(OUTER.vertices)]),
-)
+HOLLOW = joined(OUTER, flipped(INNER))
 
 
 def surface(mesh: TriangleMesh) -> Surface:

@@ -121,7 +121,7 @@ def audit_regions(case: AuditCase, findings: AuditFindings) -> None:
 def _audit_selection(case: AuditCase, findings: AuditFindings) -> None:
     """Check what is said of the faces that were chosen; who chose them is no claim."""
     selection, surface = case.plan.document.surface.selection, case.plan.surface
-    kind = "curvature" if selection is None else selection.kind
+    kind = case.plan.document.faces_chosen_by
     target = case.plan.requirements.target
     findings.holds(
         (kind == "outside") == (target == "outside"),
