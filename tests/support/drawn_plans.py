@@ -19,6 +19,7 @@ from planning.model.errors import PlanningError
 from planning.model.plan import RigPlan
 from planning.report.made_again import again_or_why_not
 from planning.scene.draws import DRAWS
+from planning.verify.audit.audit_case import N_SAMPLES, examine
 from planning.verify.verification import Verification, verify_plan
 from support.drawn_jobs import Job
 from support.little_work import (
@@ -117,9 +118,11 @@ def _working_little(job: Job) -> Generator[None]:
         else:
             work_least(patch)
             bound_roughly(patch)
-            # How far light reaches is held to a twentieth: few samples don't tell. Nor
-            # do covers of fewer than the audit takes them to be chosen on.
+            # How far light reaches is held to a twentieth: few samples don't tell,
+            # whoever draws them. Nor do covers of fewer than the audit takes them to
+            # be chosen on.
             draw_fewer(patch, axes=_AXES, projectors=_COVERED, cameras=_COVERED)
+            patch.setitem(examine.__kwdefaults__, "n_samples", N_SAMPLES)
             offer_fewer(patch, 80, 60)
         # A run that was cut ends itself, not this process.
         patch.setattr("planning.cli.console.leave", sys.exit)
