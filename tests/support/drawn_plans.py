@@ -35,7 +35,7 @@ _LONGEST_S = 400
 # Told again, for a library that calls back may swallow it.
 _AGAIN_S = 20
 _INTERRUPTED = 130
-_AXES, _COVERED = DRAWS.axes.count, 1000
+_AXES, _CLAIMS, _COVERED = DRAWS.axes.count, DRAWS.claims.count, 1000
 
 
 class _TooLongError(Exception):
@@ -119,9 +119,10 @@ def _working_little(job: Job) -> Generator[None]:
             work_least(patch)
             bound_roughly(patch)
             # How far light reaches is held to a twentieth: few samples don't tell,
-            # whoever draws them. Nor do covers of fewer than the audit takes them to
-            # be chosen on.
-            draw_fewer(patch, axes=_AXES, projectors=_COVERED, cameras=_COVERED)
+            # whoever draws them; nor do an audit's many bear with a plan's few. Nor do
+            # covers of fewer than the audit takes them to be chosen on.
+            draw_fewer(patch, axes=_AXES, claims=_CLAIMS)
+            draw_fewer(patch, projectors=_COVERED, cameras=_COVERED)
             patch.setitem(examine.__kwdefaults__, "n_samples", N_SAMPLES)
             offer_fewer(patch, 80, 60)
         # A run that was cut ends itself, not this process.
