@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from geometry.arrays import Array, Ints, lengths
+from geometry.arrays import Array, Ints, Mask, lengths
 
 # Rows: the world axes that a face's x, y and z run along.
 _AXES = np.array([[1, 2, 0], [1, 2, 0], [2, 0, 1], [2, 0, 1], [0, 1, 2], [0, 1, 2]])
@@ -70,7 +70,7 @@ class CubeMap:
 
     @property
     def clearance(self) -> float:
-        """Angle within which no direction leaves its cell and `neighbours` of it.
+        """Angle within which no direction leaves its cell and those around it.
 
         Two lines a step apart meet at the face's poles; on a face they are nearest to
         each other at its edges, 45 degrees from there::
@@ -80,62 +80,22 @@ class CubeMap:
         return float(np.arcsin(np.sin(0.5 * np.pi / self.n) * np.sqrt(0.5))) - _ROUNDING
 
     @cached_property
-    def neighbours(self) -> Ints:
-        """Cells around each cell, itself among them, shape (size, k); may repeat.
+    def around_border(self) -> tuple[Ints, Ints]:
+        """Cells at the borders of faces, (m,), and those around each, (m, k).
 
-        On a face these are the eight around it. At the border of a face, all whose
-        circles about them come within `clearance` of the cell's.
+        Each itself among them; they may repeat. They are all whose circles about them
+        come within `clearance` of the cell's. Inside a face the eight about a cell are
+        those around it.
         """
         n = self.n
         _, j, i = np.unravel_index(np.arange(self.size), (FACES, n, n))
         inner = (i > 0) & (i < n - 1) & (j > 0) & (j < n - 1)
         border = np.flatnonzero(~inner)
         kept = self._within(self.centres[border], self.radii[border] + self.clearance)
-        width = max(9, *(cells.size for cells in kept))
-        around = np.repeat(np.arange(self.size)[:, None], width, axis=1)
-        for row, cells in zip(border, kept, strict=True):
-            around[row, : cells.size] = cells
-        steps = [(b, a) for b in (-1, 0, 1) for a in (-1, 0, 1)]
-        for column, (b, a) in enumerate(steps):
-            around[inner, column] += b * n + a
-        return around
-
-    @property
-    def corner_clearance(self) -> float:
-        """Angle within which no direction leaves `around_corners` of its corner.
-
-        Like `clearance`, of lines half a step apart.
-        """
-        return (
-            float(np.arcsin(np.sin(0.25 * np.pi / self.n) * np.sqrt(0.5))) - _ROUNDING
-        )
-
-    @cached_property
-    def around_corners(self) -> Ints:
-        """Cells around each corner, shape (6 (n + 1)^2, k); may repeat.
-
-        On a face the four that meet there. At its border, all whose circles about them
-        come within `corner_clearance` of what is nearer to the corner than to others.
-        """
-        n = self.n
-        _, j, i = np.unravel_index(
-            np.arange(FACES * (n + 1) ** 2), (FACES, n + 1, n + 1)
-        )
-        inner = (i > 0) & (i < n) & (j > 0) & (j < n)
-        border = np.flatnonzero(~inner)
-        # What is nearest to it lies in a cell of half the width that it is a corner of.
-        own = 2.0 * float(cube_map(2 * n).radii.max()) + self.corner_clearance
-        corners = self.corners.reshape(-1, 3)[border]
-        kept = self._within(corners, np.full(border.size, own))
-        face, rest = np.divmod(np.arange(inner.size), (n + 1) ** 2)
-        row, column = np.divmod(rest, n + 1)
-        first = (face * n + np.maximum(row - 1, 0)) * n + np.maximum(column - 1, 0)
-        around = np.repeat(first[:, None], max(4, *(c.size for c in kept)), axis=1)
-        around[inner, 1:4] += np.array([1, n, n + 1])
-        for row_, cells in zip(border, kept, strict=True):
-            around[row_] = cells[0]
-            around[row_, : cells.size] = cells
-        return around
+        around = np.repeat(border[:, None], max(cells.size for cells in kept), axis=1)
+        for row, cells in zip(around, kept, strict=True):
+            row[: cells.size] = cells
+        return border, around
 
     def _within(self, directions: Array, reach: Array) -> list[Ints]:
         """Return the cells whose circles come within an angle of each direction."""
@@ -181,6 +141,36 @@ def located(directions: Array, n: Ints | int) -> Ints:
 
     Directions may have any length but 0; `n` is one number, or each one's own.
     """
+    face, across, upwards = _placed(directions)
+    i, j = _steps(across, n), _steps(upwards, n)
+    return (face * n + j) * n + i
+
+
+def cells_within(directions: Array, angles: Array, n: int) -> tuple[Ints, Mask]:
+    """Return the four cells that hold all within an angle of directions, (m, 4).
+
+    They repeat where fewer do. And whether four do, (m,): the cone is no wider than a
+    cell, and stays on its face. About a face's x axis, and its y axis, a cone of angle
+    w [rad] at latitude l turns by at most asin(sin w / cos l), and on a face no
+    latitude exceeds 45 degrees.
+    """
+    face, *places = _placed(directions)
+    turn = np.arcsin(np.minimum(np.sqrt(2.0) * np.sin(angles), 1.0)) + _ROUNDING
+    half = turn * (2.0 / np.pi) * n
+    do = half <= 0.5
+    steps: list[list[Ints]] = []
+    for place in places:
+        middle = (np.arctan(place) * (4.0 / np.pi) + 1.0) * (0.5 * n)
+        low, high = middle - half, middle + half
+        do &= (low >= 0.0) & (high < n)
+        ends = [np.clip(end.astype(np.int64), 0, n - 1) for end in (low, high)]
+        steps.append(ends)
+    cells = [(face * n + row) * n + column for row in steps[1] for column in steps[0]]
+    return np.stack(cells, axis=1), do
+
+
+def _placed(directions: Array) -> tuple[Ints, Array, Array]:
+    """Return the face of each direction, and its gnomonic x and y there, (m,) each."""
     # Column by column: rows of three are too short for numpy's loops.
     flat = np.ascontiguousarray(directions, dtype=np.float64).ravel()
     x, y, z = (np.ascontiguousarray(flat[k::3]) for k in range(3))
@@ -193,18 +183,7 @@ def located(directions: Array, n: Ints | int) -> Ints:
     upwards = np.where(first, z, np.where(second, x, y))
     face = np.where(first, 0, np.where(second, 2, 4)) + (along < 0)
     length = np.abs(along)
-    i, j = _steps(across / length, n), _steps(upwards / length, n)
-    return (face * n + j) * n + i
-
-
-def nearest_corner(directions: Array, n: Ints | int) -> Ints:
-    """Return the corner nearest in steps, of a map of n cells an edge, (m,).
-
-    Corner (row j, column i) of face k is (k (n + 1) + j) (n + 1) + i.
-    """
-    face, rest = np.divmod(located(directions, 2 * n), 4 * n * n)
-    j, i = np.divmod(rest, 2 * n)
-    return (face * (n + 1) + (j + 1) // 2) * (n + 1) + (i + 1) // 2
+    return face, across / length, upwards / length
 
 
 def _steps(gnomonic: Array, n: Ints | int) -> Ints:

@@ -35,7 +35,7 @@ _SINGLE = 1e-4
 # own face is as narrow, is taken to be free: what is near it counts for some rays only.
 _SLACKS = 16.0
 # How near, in shares of the mesh's size, faces are that are looked at alone.
-_NEAR = (0.04, 0.16)
+_NEAR = (0.01, 0.03, 0.1)
 # Samples whose caps are laid over all cells at a time: they stay in the cache.
 _CAPS = 4
 
@@ -95,14 +95,15 @@ class OpenDirections:
             # Rays leave out what is within the slack of a sample, as the planner's do.
             slack = _SLACKS * self._visibility.slack
             sides = self._edges.sides(points, normals, slack)
-            blocked, among = np.zeros(cells.shape, dtype=bool), None
-            for reach in (np.inf, *self._near):
+            blocked, close = np.zeros(cells.shape, dtype=bool), None
+            for reach in (*self._near, np.inf):
+                among = None
                 if reach < np.inf:
-                    among = self._edges.faces_within(sides, reach)
+                    among = close = self._edges.faces_within(sides, reach)
                 crossing = self._edges.seen_from(sides, self._cone, among)
                 asked = cells & ~blocked
                 blocked |= self._blocked(crossing, points, normals, asked, reach)
-            doubtful = self._edges.touched(sides, faces, slack, self._cone, among)
+            doubtful = self._edges.touched(sides, faces, slack, self._cone, close)
             doubtful |= self._narrow[faces]
             cells &= ~blocked | doubtful[:, None]
         return cells

@@ -2,15 +2,15 @@
 
 A cell of a widened map is set where the cell or one around it is; after k rounds it
 answers for all directions within k times the map's clearance. Coarser maps, widened
-likewise, answer for larger angles. For half the clearance the four cells suffice that
-meet in the corner nearest to a direction.
+likewise, answer for larger angles. Of a cone that is no wider than a cell of the finest
+map those that it meets are looked at, four at most, unless it leaves its face.
 """
 
 import numpy as np
 
 from geometry.arrays import Array, Ints, Mask, Words
 
-from .cube_map import CubeMap, cube_map, located, nearest_corner
+from .cube_map import FACES, CubeMap, cells_within, cube_map, located
 
 # Rounds of widening: the finest map, then the others.
 _FINEST = (1, 2, 3)
@@ -25,9 +25,9 @@ class WidenedMaps:
     """
 
     def __init__(self, rows: Words, cube: CubeMap) -> None:
-        made: list[Words] = [_joined(rows, cube.around_corners)]
-        angles: list[float] = [cube.corner_clearance]
-        cells: list[int] = [cube.n]
+        made: list[Words] = [rows]
+        angles: list[float] = []
+        cells: list[int] = []
         rounds = _FINEST
         while True:
             wide = rows
@@ -43,7 +43,7 @@ class WidenedMaps:
         self._angles, self._cells = np.array(angles), np.array(cells)
         # All maps one below the other, so that one look answers from all of them.
         self._rows = np.concatenate(made).view(np.uint8)
-        self._first = np.cumsum([0, *(len(maps) for maps in made[:-1])])
+        self._first = np.cumsum([len(maps) for maps in made[:-1]])
 
     def open(self, directions: Array, angles: Array, samples: Ints) -> Mask:
         """Return whether samples (m,) have an open direction near to one given, (m,).
@@ -57,22 +57,36 @@ class WidenedMaps:
         some = np.flatnonzero(level < self._angles.size)
         level, sample = level[some], samples[some]
         towards = directions.take(some, axis=0)
-        cell = located(towards, self._cells[level])
-        corner = np.flatnonzero(level == 0)
-        cell[corner] = nearest_corner(towards[corner], int(self._cells[0]))
-        byte = (self._first[level] + cell) * self._rows.shape[1] + sample // 8
-        bits = self._rows.ravel().take(byte) >> (7 - sample % 8).astype(np.uint8)
-        answer[some] = (bits & 1).view(np.bool_)
+        cell = self._first[level] + located(towards, self._cells[level])
+        answer[some] = self._bits(cell, sample)
+        # What may yet be closed by a closer look.
+        near = np.flatnonzero(answer[some] & (level == 0))
+        if near.size:
+            small = some[near]
+            four, do = cells_within(towards[near], angles[small], int(self._cells[0]))
+            small, four = small[do], four[do]
+            answer[small] = False
+            for cells in four.T:
+                answer[small] |= self._bits(cells, samples[small])
         return answer
+
+    def _bits(self, cells: Ints, samples: Ints) -> Mask:
+        """Return the bit of each pair of row and sample, (m,)."""
+        byte = cells * self._rows.shape[1] + samples // 8
+        bits = self._rows.ravel().take(byte) >> (7 - samples % 8).astype(np.uint8)
+        return (bits & 1).view(np.bool_)
 
 
 def _widened(rows: Words, cube: CubeMap) -> Words:
-    return _joined(rows, cube.neighbours)
-
-
-def _joined(rows: Words, of: Ints) -> Words:
-    """Return the union of the rows of cells (m, k), one of each m."""
-    wide = rows[of[:, 0]]
-    for column in of.T[1:]:
-        np.bitwise_or(wide, rows[column], out=wide)
+    """Return the union of the rows of each cell and those around it."""
+    within = rows.reshape(FACES, cube.n, cube.n, -1)
+    across = within.copy()
+    across[:, :, 1:] |= within[:, :, :-1]
+    across[:, :, :-1] |= within[:, :, 1:]
+    wide = across.copy()
+    wide[:, 1:] |= across[:, :-1]
+    wide[:, :-1] |= across[:, 1:]
+    wide = wide.reshape(rows.shape)
+    border, around = cube.around_border
+    wide[border] = np.bitwise_or.reduce(rows[around], axis=1)
     return wide

@@ -38,6 +38,8 @@ class Effort:
             leaves room for fewer projectors.
         maps: As `finest`, of the maps in which shadows are drawn; in parallel light
             their cells are those that are searched.
+        finer_budget: Counted work of another search among shadows, in maps and cells
+            twice as fine, where known poses leave room for a proof.
         starts: Searches for projectors between the bound and the count.
         aims: As `finest`, of the aims of cameras whose image the object overflows;
             None: cells aren't cut by aim.
@@ -49,6 +51,7 @@ class Effort:
     most_samples: int | None = None
     offers: int = 0
     maps: int = 0
+    finer_budget: float = 0.0
     aims: int | None = None
     starts: int = 0
 

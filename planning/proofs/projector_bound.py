@@ -43,7 +43,18 @@ DEFAULT = Effort(
 # Share of the work for a search without shadows, where they can be drawn, and the level
 # that its cells end at: finer ones have refuted nothing there.
 _FIRST, _FIRST_FINEST = 0.3, 9
-PROVE = Effort(finest=11, maps=7, budget=4e10, shadows=np.inf, offers=150, starts=4)
+PROVE = Effort(
+    finest=11,
+    maps=7,
+    budget=4e10,
+    finer_budget=7e10,
+    shadows=np.inf,
+    offers=150,
+    starts=4,
+)
+# What the multipliers prove over candidates is this share more than they do over all
+# poses, and more than cells of any size prove. Bytes that finer maps may take.
+_ROOM, _MAP_BYTES = 0.05, 1.5e8
 
 
 def bound_projectors(
@@ -90,6 +101,14 @@ def bound_projectors(
             tree = _positions(scene, templates, samples, maps, effort.finest)
         return question.searched(tree, effort.budget, known), tree
 
+    def may_refute(bound: CellBound) -> bool:
+        """Return whether finer maps may prove more, and aren't too large."""
+        fewer = max(question.count - 1, 1)
+        leaves = bound.status is not CellStatus.PROVED
+        leaves &= bound.over_known >= (1.0 + _ROOM) * fewer
+        finer = cube_map(1 << effort.maps + 1)
+        return leaves and finer.size * len(samples) <= 8.0 * _MAP_BYTES
+
     # Shadows cost most, and what is proved without them holds with them.
     first = effort
     if shadows:
@@ -98,6 +117,14 @@ def bound_projectors(
     bound, tree = searched(first, shadows=False)
     if shadows and bound.status is not CellStatus.PROVED:
         among = searched(effort, shadows=True)
+        if effort.finer_budget and may_refute(among[0]):
+            again = replace(
+                effort,
+                maps=effort.maps + 1,
+                finest=effort.finest + 1,
+                budget=effort.finer_budget,
+            )
+            among = max(among, searched(again, shadows=True), key=_proved)
         # Cut short, a longer search may have proved less.
         if shadows := among[0].lower_bound >= bound.lower_bound:
             bound, tree = among
@@ -106,6 +133,10 @@ def bound_projectors(
         unrefuted = _promising(bound, tree, effort.offers)
     shadows = shadows or question.count <= 1
     return ContinuousBound(question, bound, shadows, unrefuted)
+
+
+def _proved(found: tuple[CellBound, _Tree]) -> float:
+    return found[0].lower_bound
 
 
 def _positions(

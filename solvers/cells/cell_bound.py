@@ -57,6 +57,8 @@ class CellBound:
         multipliers: Of the rows, integers, shape (n_rows,).
         largest_cost: No pose serves rows of more than this cost by the multipliers.
         by_multipliers: The part of the bound that they prove.
+        over_known: The most that multipliers prove over the known poses alone; inf if
+            none are known.
         most_weight: Weight that ``count`` - 1 poses serve at most, by them.
         cells_used: Cells that the tree was asked for.
     """
@@ -71,6 +73,7 @@ class CellBound:
     multipliers: NDArray[np.int64]
     largest_cost: int
     by_multipliers: float
+    over_known: float
     most_weight: float
     cells_used: int
 
@@ -226,6 +229,7 @@ class _Proof:
             multipliers=multipliers,
             largest_cost=search.largest_cost,
             by_multipliers=search.bound,
+            over_known=search.over_known,
             most_weight=min(self.whole.in_unit(most), total),
             cells_used=np.union1d(self.store.names, self.seen).size,
         )

@@ -56,6 +56,8 @@ class MultiplierSearch:
         largest_cost: Largest lambda(S) of the frontier then, hence of all poses.
         ratio: need(lambda) / M by these; at least so many poses, not rounded.
         bound: The same, rounded up; inf if no number of poses is enough.
+        over_known: The most that multipliers prove over the known poses alone, as far
+            as was looked; no more can be proved over all. inf if none are known.
     """
 
     def __init__(
@@ -71,6 +73,7 @@ class MultiplierSearch:
         self._spread, self._taken = known is None, np.empty(0, dtype=np.int64)
         self.multipliers, self.largest_cost = np.zeros_like(whole.weights), 0
         self.ratio, self.bound = Fraction(0), 0.0
+        self.over_known = float("inf") if known is None else 0.0
         start = whole.multipliers(whole.weights / np.maximum(whole.needs, 1))
         self._record(start, store.costs(store.frontier, start))
 
@@ -115,6 +118,9 @@ class MultiplierSearch:
             reached = proposal.value > -_TOLERANCE * self._whole.weights.size
             multipliers = self._whole.multipliers(proposal.multipliers)
             costs = BitSum(multipliers)(self._poses.values)
+            if not self._taken.size and (largest := int(costs.max(initial=0))):
+                least = float(self._whole.least_cost(multipliers) / largest)
+                self.over_known = max(self.over_known, least)
             in_hand = np.zeros(costs.size, dtype=bool)
             in_hand[self._program.poses] = True
             most = int(costs[in_hand].max(initial=0))

@@ -13,7 +13,7 @@ from geometry.directions.cube_map import (
     quarters,
     widest,
 )
-from geometry.directions.widened_maps import WidenedMaps
+from geometry.directions.widened_maps import WidenedMaps, _widened
 
 
 def directions(n: int, seed: int = 0) -> np.ndarray:
@@ -70,8 +70,13 @@ def test_no_direction_leaves_the_neighbours_within_the_clearance(n):
     some = np.concatenate([some, near / np.linalg.norm(near, axis=1, keepdims=True)])
     cell = cube.locate(some)
     there = cube.locate(turned(some, cube.clearance))
-    assert np.all(np.any(cube.neighbours[cell] == there[:, None], axis=1))
     assert np.any(cell != there)
+    # Columns that are each open in one cell, widened.
+    asked = np.arange(0, len(some), 8)
+    rows = np.zeros((cube.size, asked.size), dtype=bool)
+    rows[there[asked], np.arange(asked.size)] = True
+    wide = np.unpackbits(_widened(np.packbits(rows, axis=1), cube), axis=1)
+    assert np.all(wide[cell[asked], np.arange(asked.size)])
 
 
 @pytest.mark.parametrize("n", [2, 4, 16])
@@ -148,4 +153,9 @@ def test_widened_maps_never_miss_an_open_direction(n):
     far = angle_between(asked, targets[which]) > 0.5
     closed = ~maps.open(asked, np.full(which.size, 0.01), which)
     assert closed[far].mean() > (0.9 if n == 32 else 0.0)
+    # Of next to no cone the cell that it lies in decides, but at borders of faces.
+    own = is_open[which, cube.locate(asked)]
+    found = maps.open(asked, np.full(which.size, 1e-7), which)
+    assert np.all(found[own])
+    assert np.mean(found != own) < 1e-3
     assert maps.open(asked, np.full(which.size, 3.2), which).all()
