@@ -5,7 +5,9 @@ stand for poses. They are few and lie where they matter, so its multipliers are 
 those of all poses. By them, cells of the frontier that cost too much are split, the
 costliest first; the frontier is the set of cells that aren't split, and holds every
 pose. Either none of it costs too much any more, and the number is refuted, or cells do
-that can't be split, and become rows of the program.
+that can't be split, and become rows of the program. Multipliers between the best so far
+and those proposed are tried first (Ben-Ameur and Neto, "Acceleration of cutting-plane
+and column generation algorithms", Networks 49(1), 2007).
 """
 
 from fractions import Fraction
@@ -28,6 +30,9 @@ _ENOUGH = 40
 _SPLIT = 400
 # Where no poses are known: cells below each of which one that can't be split is taken.
 _SPREAD = 100
+# How far from the best multipliers towards those proposed cells are first looked at:
+# proposals leap from one corner of the program to another, and each leap splits others.
+_STEP = 0.5
 _TOLERANCE = 1e-6
 
 
@@ -94,13 +99,32 @@ class MultiplierSearch:
             proposal = self._proposed()
             if proposal is None:
                 break
-            leaves = self._drilled(n_poses, proposal.multipliers)
+            leaves = np.empty(0, dtype=np.int64)
+            if self.ratio and not proposal.reached:
+                between = self._between(proposal.multipliers)
+                leaves = self._drilled(n_poses, between)
+                leaves = leaves[self._cut_off(leaves, proposal.multipliers)]
+            if not leaves.size and self.bound <= n_poses:
+                leaves = self._drilled(n_poses, proposal.multipliers)
             # What is in hand already would change nothing.
             leaves = np.setdiff1d(leaves, self._taken)
             if proposal.reached or not leaves.size:
                 break
             self._take(leaves)
         return self.bound > n_poses
+
+    def _between(self, proposed: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return multipliers on the way from the best ones to those proposed."""
+        dearest = int(BitSum(proposed)(self._poses.values).max(initial=1))
+        best = self.multipliers / max(1, self.largest_cost)
+        return self._whole.multipliers(best + _STEP * (proposed / dearest - best))
+
+    def _cut_off(
+        self, leaves: NDArray[np.int64], proposed: NDArray[np.int64]
+    ) -> NDArray[np.bool_]:
+        """Return which cells cost more by those proposed than all poses in hand."""
+        dearest = int(BitSum(proposed)(self._poses.values).max(initial=1))
+        return self._store.costs(leaves, proposed) > dearest * (1.0 + _TOLERANCE)
 
     def _prepare(self, n_poses: int) -> None:
         self._program.set_count(n_poses)
