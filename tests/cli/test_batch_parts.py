@@ -148,6 +148,26 @@ def test_a_terminal_shows_how_many_ended_and_what_runs(
     assert ("/2" in shown) == terminal
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        *(("--region-coverage", "0.0"), ("--seed", "0"), ("--survive", "0")),
+        *(("--coverage", "0.98"), ("--joint",), ("--target", "outside")),
+    ],
+)
+def test_each_part_is_asked_what_the_batch_is(tmp_path, monkeypatch, words):
+    asked = []
+
+    def planned(task):
+        asked.append(task.words)
+        return PartEnd(task.name, 3, "not planned", 0.0, {})
+
+    monkeypatch.setattr(runners, "plan_part", planned)
+    run(made(tmp_path / "in", "a.obj"), "-o", tmp_path / "out", *words)
+    ((*told,),) = asked
+    assert sorted(told) == sorted(("--max-projectors", "4", *words))
+
+
 @pytest.mark.parametrize("given", [".", "..", "link"])
 def test_what_plans_hold_is_no_part(tmp_path, monkeypatch, begun, given):
     monkeypatch.chdir(made(tmp_path, "in/a.obj", "in/out/a/cloud.ply") / "in")

@@ -79,7 +79,8 @@ def _words(context: click.Context) -> Iterator[str]:
         name = param.name or ""
         source = context.get_parameter_source(name)
         value = context.params.get(name)
-        if source is not ParameterSource.COMMANDLINE or value in (None, False):
+        # By identity: 0 is False's equal, and an answer.
+        if source is not ParameterSource.COMMANDLINE or value is None or value is False:
             continue
         if name == "rig_name" and str(value).endswith(".toml"):
             continue
