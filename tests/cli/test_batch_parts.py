@@ -16,6 +16,8 @@ from planning.cli.batch.part_task import PartEnd, PartTask, plan_part
 from planning.cli.batch.parts import find_parts
 from planning.cli.batch.sent_files import rig_files
 from planning.cli.main import commands
+from planning.model import installed
+from planning.model.document import made_with
 
 # Instead of a plan: what a rig file's text leads to from where the part is planned.
 READS = """
@@ -166,6 +168,22 @@ def test_each_part_is_asked_what_the_batch_is(tmp_path, monkeypatch, words):
     run(made(tmp_path / "in", "a.obj"), "-o", tmp_path / "out", *words)
     ((*told,),) = asked
     assert sorted(told) == sorted(("--max-projectors", "4", *words))
+
+
+@pytest.mark.parametrize("room", ["verify", "handover", "experiments", "cli", "steps"])
+def test_rows_and_workers_are_of_the_same_code_in_all_rooms(
+    tmp_path, monkeypatch, begun, room
+):
+    made(tmp_path, "in/a.obj", f"planning/{room}/a.py")
+    home = tmp_path / "planning" / "model" / "installed.py"
+    monkeypatch.setattr(installed, "__file__", str(home))
+    monkeypatch.setattr(made_with, "_here", made_with._here.__wrapped__)
+    told = []
+    for _ in range(2):
+        run(tmp_path / "in", "-o", tmp_path / "out")
+        told += [runners._version(), rows(tmp_path / "out")[0]["asked"]]
+        (tmp_path / "planning" / room / "a.py").write_text("another")
+    assert len({*told}) == 4
 
 
 @pytest.mark.parametrize("given", [".", "..", "link"])

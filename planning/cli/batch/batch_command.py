@@ -10,7 +10,6 @@ from typing import Any
 import click
 
 from geometry.parallel import n_threads
-from planning.cache.content import code_content
 from planning.cli.console import print_json
 from planning.cli.output_folder import exchanged
 from planning.model.errors import PlanningError
@@ -76,7 +75,7 @@ class _Batch:
                 code = getattr(error, "exit_code", NO_FILE)
                 self.end(PartEnd(part.name, code, one_line(str(error)), 0.0, {}))
                 continue
-            asked = self.asked[part.name] = asked_of(task, code_content())
+            asked = self.asked[part.name] = asked_of(task)
             row = None if again else self.before.get(part.name)
             if row is not None and row.asked == asked and is_whole(row, self.out):
                 self.rows[part.name] = row

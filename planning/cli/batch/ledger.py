@@ -8,7 +8,10 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
+from platform import machine
 
+from planning.cache.content import content
+from planning.model.document.made_with import MadeWith
 from planning.model.files import write_atomically
 from planning.model.plan import RigPlan
 from planning.report.summary.shortfall import missing
@@ -69,16 +72,22 @@ class Row:
         return self.exit not in (0, 1)
 
 
-def asked_of(task: PartTask, version: str) -> str:
+def made_here() -> str:
+    """Return a hash of all code and libraries that make plans here, and check them."""
+    made = MadeWith.here()
+    return content(made.code, made.libraries, machine())
+
+
+def asked_of(task: PartTask) -> str:
     """Return a hash of all that a part's plan follows from, hexadecimal."""
-    words = json.dumps([version, *task.words])
+    words = json.dumps([made_here(), *task.words])
     return _hash_of(words, (*task.mesh.items(), *task.rig.items()))
 
 
 def _hash_of(words: str, files: Iterable[tuple[str, bytes]]) -> str:
     hashed = hashlib.sha256(words.encode())
-    for name, content in files:
-        hashed.update(f"{name}:{len(content)};".encode() + content)
+    for name, data in files:
+        hashed.update(f"{name}:{len(data)};".encode() + data)
     return hashed.hexdigest()
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from .ledger import made_here
 from .part_task import PartEnd, PartTask, plan_part, stop_parts
 
 Runner = Callable[[Iterable[PartTask]], Generator[PartEnd]]
@@ -112,9 +113,7 @@ def cluster(address: str) -> Generator[tuple[Runner, int]]:
 
 def _version() -> str:
     # Of the worker's own installation; its code says the rest.
-    from planning.cache.content import code_content
-
-    return f"{version('ringrig')}-{code_content()[:12]}"
+    return f"{version('ringrig')}-{made_here()[:12]}"
 
 
 def _here() -> str:
