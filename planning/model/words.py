@@ -19,12 +19,23 @@ def count_words(count: int, noun: str) -> str:
     return f"{count} {noun}{'s' * (count != 1)}"
 
 
-def percent(share: float, *, decimals: int = 1, asked: float = 0.0) -> str:
-    """Return a share in percent; one that misses what is asked is rounded down."""
+def percent(
+    share: float, *, decimals: int = 1, asked: float = 0.0, most: float = math.inf
+) -> str:
+    """Return a share in percent; one that misses what is asked is rounded away from it.
+
+    Args:
+        share: It.
+        decimals: Of the percents.
+        asked: What must be reached; what is less is rounded down.
+        most: What must not be exceeded; what is more is rounded up.
+    """
+    # What falls short must not look as if it were enough.
+    steps = 10.0 ** (decimals + 2)
     if share < asked:
-        # What falls short must not look as if it were enough.
-        steps = 10.0 ** (decimals + 2)
         share = math.floor(steps * share) / steps
+    elif share > most:
+        share = math.ceil(steps * share) / steps
     return f"{100.0 * share:.{decimals}f} %"
 
 

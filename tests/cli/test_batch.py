@@ -326,6 +326,24 @@ def test_a_row_tells_how_many_are_needed_not_how_many_there_may_be(tmp_path, han
     assert page.count(f"{len(plan.cameras)}, at least 6") == 2
 
 
+def test_the_index_rounds_down_what_its_why_does(tmp_path, handmade):
+    """One page said "95.0 %" beside "94.9 % measured, 95 % asked"."""
+
+    def short(document):
+        document["requirements"]["coverage"] = 0.95
+        areas = document["coverage"]["target"]
+        areas["measured_m2"] = 0.94996 * areas["reachable_by_cameras_m2"]
+
+    (tmp_path / "a").mkdir()
+    handmade.save(handmade.tampered(handmade.build_plan(), short), tmp_path / "a")
+    row = row_of(PartEnd("a.stl", 1, "", 2.0, {}), "a", tmp_path, "x")
+    assert float(row.measured) < float(row.measured_asked) == 0.95
+    write_index([row], tmp_path)
+    page = (tmp_path / "index.html").read_text()
+    assert page.count("94.9 %") == 2
+    assert "95.0 %" not in page
+
+
 def test_a_plan_is_whole_by_its_own_files_alone(done, tmp_path):
     plan = done[0] / "out" / "sub" / "block"
     files = {path.name: path.read_bytes() for path in plan.iterdir()}

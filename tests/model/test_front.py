@@ -2,6 +2,7 @@
 
 import pytest
 
+from planning.cli.lines.front_lines import front_lines
 from planning.model.front import Front, FrontPoint, marked
 
 
@@ -79,6 +80,16 @@ def test_a_bound_of_samples_is_raised_by_two_standard_errors_and_is_no_more_than
     among = front(half, nearly, samples=400, area=2.0)
     assert among.at_most_share(half) == pytest.approx(0.5 + 2.0 * 0.5 / 20.0)
     assert among.at_most_share(nearly.changed(at_most_m2=1.999)) == 1.0
+
+
+def test_what_falls_short_of_what_is_asked_is_rounded_down():
+    asked = {name: 0.95 for name in ("dominant_coverage", "coverage", "min_reachable")}
+    one = front(point(1, 2, 0.94996, 2e-4)).changed(
+        asked=asked | {"region_coverage": 0.0}, reachable_by_projectors_m2=0.94996
+    )
+    _, target, _, row, *_ = front_lines(one, "ball", [])
+    assert "(94.9 %) can be" in target
+    assert "   94.9 %   " in row
 
 
 def test_points_are_found_by_their_counts():

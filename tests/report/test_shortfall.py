@@ -1,11 +1,17 @@
 """Each missed requirement: how much, why, and the smallest relaxation that helps."""
 
+import re
+
 import pytest
 
+from planning.cli.lines.comparison import compared
 from planning.model.document.check_records import ReconstructionRecord
 from planning.model.plan import RigPlan
 from planning.model.words import area_words, percent
-from planning.report.summary.coverage_lines import area_cell
+from planning.report.page.claim_tables import claim_tables
+from planning.report.summary.coverage_lines import area_cell, marginal_lines
+from planning.report.summary.family_lines import _shares
+from planning.report.summary.region_lines import region_table
 from planning.report.summary.shortfall import shortfalls
 
 
@@ -102,6 +108,35 @@ def test_a_share_that_is_missed_is_rounded_down(plan):
     (line,) = missed(plan, reachable_by_projectors_m2=0.89981, lit_m2=0.89)
     assert line.startswith("only 89.9 % of the target")
     assert percent(0.89981, asked=0.89) == "90.0 %"
+    assert percent(0.03001, decimals=2, most=0.03) == "3.01 %"
+    assert percent(0.02999, decimals=2, most=0.03) == "3.00 %"
+
+
+TABLES = {
+    "comparison": lambda plan: [row.first for row in compared(plan, plan)[12:]],
+    "family": _shares,
+    "regions": region_table,
+    "one more or fewer": marginal_lines,
+    "page": claim_tables,
+}
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_no_table_rounds_up_what_a_sentence_rounds_down(plan, name):
+    """0.004 % fall short of what is lit, measured and lit of each region."""
+    document = plan.to_document()
+    document["requirements"] |= {"dominant_coverage": 0.9, "coverage": 0.95}
+    document["requirements"]["region_coverage"] = 0.5
+    short = [(document["coverage"]["target"], 0.89996, 0.94996)]
+    short += [(one["coverage"], 0.49996, 0.49996) for one in document["regions"]]
+    for areas, lit, measured in short:
+        areas["lit_m2"] = lit * areas["reachable_by_projectors_m2"]
+        areas["measured_m2"] = measured * areas["reachable_by_cameras_m2"]
+    for row in document["marginal"]:
+        row |= {"worst_region_lit": 0.49996} if "n_projectors" in row else {}
+    told = "".join(TABLES[name](RigPlan.from_document(document, plan.surface)))
+    assert {"89.9 %", "94.9 %", "49.9 %"} & {*re.findall(r"\d+\.\d %", told)}
+    assert not {"90.0 %", "95.0 %", "50.0 %"} & {*re.findall(r"\d+\.\d %", told)}
 
 
 def test_bodies_that_are_in_the_way_are_named(plan):

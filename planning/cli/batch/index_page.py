@@ -7,6 +7,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from planning.model.files import write_atomically
+from planning.model.words import percent
 from planning.report.page.markup import element, table, with_link
 from planning.report.page.page import PAGE
 
@@ -67,7 +68,9 @@ def _cells(row: Row) -> list[str]:
         row.verdict,
         _counted(row.projectors, row.projectors_least),
         _counted(row.cameras, row.cameras_least),
-        *(_percent(share) for share in (row.lit, row.measured, row.of_target)),
+        _percent(row.lit, row.lit_asked),
+        _percent(row.measured, row.measured_asked),
+        _percent(row.of_target),
         row.rms_mm,
         row.seconds,
         row.message,
@@ -80,8 +83,8 @@ def _counted(count: str, least: str) -> str:
     return count if count == least else f"{count}, at least {least}"
 
 
-def _percent(share: str) -> str:
-    return f"{100.0 * float(share):.1f} %" if share else ""
+def _percent(share: str, asked: str = "") -> str:
+    return percent(float(share), asked=float(asked or 0.0)) if share else ""
 
 
 def _stands(row: Row, out: Path, name: str) -> bool:

@@ -35,6 +35,7 @@ class Row:
             may be; of cameras likewise.
         lit: Share of what projectors can reach of the target.
         measured: Share of what cameras can reach of what is lit.
+        lit_asked: What the first must be, `measured_asked` the second.
         of_target: Measured share of the whole target.
         target_cm2: Its area.
         rms_mm: Of the check from pixels.
@@ -56,6 +57,8 @@ class Row:
     cameras_least: str = ""
     lit: str = ""
     measured: str = ""
+    lit_asked: str = ""
+    measured_asked: str = ""
     of_target: str = ""
     target_cm2: str = ""
     rms_mm: str = ""
@@ -113,6 +116,7 @@ def row_of(end: PartEnd, folder: str, out: Path, asked: str) -> Row:
 
 def _with_plan(row: Row, plan: RigPlan) -> Row:
     areas, proofs = plan.coverage.target, plan.document.certificates
+    asked = plan.requirements
     check, lights = plan.document.reconstruction, proofs.projectors
     missed = [one.figure for one in missing(plan)]
     if check is None and row.exit == 0:
@@ -125,6 +129,8 @@ def _with_plan(row: Row, plan: RigPlan) -> Row:
         cameras_least=str(proofs.cameras.needed.lower_bound),
         lit=_share(areas.lit_m2, areas.reachable_by_projectors_m2),
         measured=_share(areas.measured_m2, areas.reachable_by_cameras_m2),
+        lit_asked=f"{asked.dominant_coverage:g}",
+        measured_asked=f"{asked.coverage:g}",
         of_target=_share(areas.measured_m2, areas.area_m2),
         target_cm2=f"{1e4 * areas.area_m2:.2f}",
         rms_mm=""
@@ -136,7 +142,8 @@ def _with_plan(row: Row, plan: RigPlan) -> Row:
 
 
 def _share(part: float, whole: float) -> str:
-    return f"{part / whole:.4f}" if whole > 0.0 else ""
+    # To the last digit: whoever shows it rounds once.
+    return str(part / whole) if whole > 0.0 else ""
 
 
 def write_rows(rows: Iterable[Row], out: Path) -> None:

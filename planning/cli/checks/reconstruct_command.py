@@ -20,7 +20,7 @@ from planning.model.errors import CapturesError
 from planning.model.files import write_atomically
 from planning.model.plan import RigPlan
 from planning.model.progress import Report
-from planning.model.words import count_words
+from planning.model.words import count_words, percent
 from planning.report.summary.check_lines import error_words
 from planning.verify.audit.coverage.prediction import predict_measured
 from planning.verify.reconstruction.captures.calibration_file import calibrated
@@ -292,5 +292,7 @@ def _figures(plan: RigPlan, result: Reconstruction) -> list[str]:
         f"completeness of the target predicted measured: {near}",
     ]
     if missing is not None:
-        lines[-1] += f"; {missing:.2%} missing ({limits.max_predicted_missing:.0%})"
+        most = limits.max_predicted_missing
+        gone = percent(missing, decimals=2, most=most)
+        lines[-1] += f"; {gone} missing ({100 * most:g} %)"
     return lines

@@ -9,6 +9,7 @@ import numpy as np
 from planning.model.document.certificates import Certificate
 from planning.model.plan import RigPlan
 from planning.model.words import percent
+from planning.report.summary.check_lines import missing_words
 from planning.report.summary.devices.station_lines import STATIONS, device_counts
 from planning.report.summary.family_lines import members_words
 from planning.report.summary.shortfall import missing
@@ -138,15 +139,18 @@ def _proof(kind: str, proof: Certificate) -> Iterator[tuple[str, str]]:
 
 def _coverage(plan: RigPlan) -> Iterator[tuple[str, str]]:
     areas, sigma = plan.coverage.target, plan.coverage.sigma
+    asked = plan.requirements
     yield "target [cm²]", f"{1e4 * areas.area_m2:.2f}"
     if not plan.cameras_alone:
         yield (
             "lit of what can be",
-            _share(areas.lit_m2, areas.reachable_by_projectors_m2),
+            _share(
+                areas.lit_m2, areas.reachable_by_projectors_m2, asked.dominant_coverage
+            ),
         )
     yield (
         "measured of what can be",
-        _share(areas.measured_m2, areas.reachable_by_cameras_m2),
+        _share(areas.measured_m2, areas.reachable_by_cameras_m2, asked.coverage),
     )
     yield "measured of the target", _share(areas.measured_m2, areas.area_m2)
     if sigma is not None:
@@ -164,7 +168,7 @@ def _check(plan: RigPlan) -> Iterator[tuple[str, str]]:
         yield "its p95 [mm]", _mm(check.accuracy_p95_m)
         yield (
             "predicted but missing",
-            percent(check.predicted_missing or 0.0, decimals=2),
+            missing_words(check, plan.requirements),
         )
     yield "frames", str(cost.n_frames)
     if cost.frame_s is not None:
@@ -198,5 +202,5 @@ def _mm(metres: float | None) -> str:
     return _NONE if metres is None else f"{1e3 * metres:.3f}"
 
 
-def _share(part: float, whole: float) -> str:
-    return percent(part / whole) if whole > 0.0 else "none"
+def _share(part: float, whole: float, asked: float = 0.0) -> str:
+    return percent(part / whole, asked=asked) if whole > 0.0 else "none"

@@ -22,7 +22,8 @@ _NOTES = (
 
 def front_lines(front: Front, name: str, files: Sequence[str]) -> Iterator[str]:
     """Yield what is printed of a front: head, a line a point, what to do with it."""
-    reachable = front.reachable_by_projectors_m2
+    reachable, asked = front.reachable_by_projectors_m2, front.asked
+    within = percent(reachable / front.area_m2, asked=asked["min_reachable"])
     yield from labelled(
         "FRONT",
         (
@@ -30,14 +31,13 @@ def front_lines(front: Front, name: str, files: Sequence[str]) -> Iterator[str]:
             f"{front.camera_candidates:,} camera candidates on {front.samples:,} "
             f"samples; NOT CHECKED",
             f"target {area_words(front.area_m2)}, of which "
-            f"{area_words(reachable)} ({percent(reachable / front.area_m2)}) can be "
+            f"{area_words(reachable)} ({within}) can be "
             f"lit; of {front.fresh_samples:,} fresh samples:",
         ),
     )
     yield _HEAD
     yield from (_row(front, point) for point in front.points)
     yield from labelled("READ", _NOTES)
-    asked = front.asked
     yield from labelled(
         "ASKED",
         [
@@ -56,6 +56,7 @@ def _row(front: Front, point: FrontPoint) -> str:
         percent(area / front.area_m2) for area in (point.lit_m2, point.measured_m2)
     )
     able = point.measured_m2 / (point.reachable_by_cameras_m2 or 1.0)
+    of_able = percent(able, asked=front.asked["coverage"])
     exact = [
         "-" if sigma is None else f"{1e3 * sigma:.3f}"
         for sigma in (point.sigma_median_m, point.sigma_p95_m)
@@ -64,7 +65,7 @@ def _row(front: Front, point: FrontPoint) -> str:
     megapixels = 1e-6 * point.pixels
     return (
         f"{point.projectors:4}{point.cameras:4}{lit:>9}{measured:>11}"
-        f"{percent(front.at_most_share(point)):>10}{percent(able):>17}"
+        f"{percent(front.at_most_share(point)):>10}{of_able:>17}"
         f"{exact[0]:>13}{exact[1]:>8}{point.frames:9}{megapixels:9,.0f} {marks}"
     ).rstrip()
 

@@ -8,7 +8,7 @@ from planning.model.document.certificates import Certificate
 from planning.model.document.coverage_records import ProjectorMarginal
 from planning.model.plan import RigPlan
 from planning.model.words import area_words, percent
-from planning.report.summary.coverage_lines import area_rows
+from planning.report.summary.coverage_lines import area_rows, reach_asked
 from planning.report.summary.devices.station_lines import STATIONS
 from planning.report.summary.region_lines import region_place
 
@@ -50,18 +50,27 @@ def _coverage(plan: RigPlan) -> str:
                 for areas in (target, surface)
                 for cell in (
                     area_words(getattr(areas, key)),
-                    _ratio(getattr(areas, key), areas.area_m2),
+                    _ratio(getattr(areas, key), areas.area_m2, reach_asked(plan, key)),
                 )
             ),
         ]
         for label, key in area_rows(plan).items()
     ]
-    shares = [
-        ("lit / reachable by projectors", "lit_m2", "reachable_by_projectors_m2"),
-        ("measured / reachable by cameras", "measured_m2", "reachable_by_cameras_m2"),
-    ]
-    for label, part, whole in shares:
-        cells = [_ratio(getattr(a, part), getattr(a, whole)) for a in (target, surface)]
+    asked = plan.requirements
+    for label, part, whole, least in (
+        (
+            *("lit / reachable by projectors", "lit_m2", "reachable_by_projectors_m2"),
+            asked.dominant_coverage,
+        ),
+        (
+            *("measured / reachable by cameras", "measured_m2"),
+            *("reachable_by_cameras_m2", asked.coverage),
+        ),
+    ):
+        cells = [
+            _ratio(getattr(areas, part), getattr(areas, whole), least)
+            for areas in (target, surface)
+        ]
         rows.append([label, "", cells[0], "", cells[1]])
     kind = plan.requirements.target
     head = ("", f"target ({kind})", "of the target", "whole surface", "of the surface")
@@ -133,6 +142,7 @@ def _proof(kind: str, proof: Certificate) -> list[str]:
 
 def _regions(plan: RigPlan) -> str:
     rows: list[list[str]] = []
+    asked = plan.requirements.region_coverage
     for region in plan.document.regions:
         areas = region.coverage
         place = region_place(plan, region).removeprefix(", ")
@@ -140,9 +150,9 @@ def _regions(plan: RigPlan) -> str:
         if areas is not None and areas.samples:
             shares = [
                 _ratio(areas.reachable_by_projectors_m2, region.area_m2),
-                _ratio(areas.lit_m2, areas.reachable_by_projectors_m2),
+                _ratio(areas.lit_m2, areas.reachable_by_projectors_m2, asked),
                 _ratio(areas.reachable_by_cameras_m2, areas.lit_m2),
-                _ratio(areas.measured_m2, areas.reachable_by_cameras_m2),
+                _ratio(areas.measured_m2, areas.reachable_by_cameras_m2, asked),
             ]
             by = " ".join((*region.lit_by, *areas.measured_by))
             floor = areas.floor or "none"
@@ -156,6 +166,7 @@ def _regions(plan: RigPlan) -> str:
 
 def _marginal(plan: RigPlan) -> Iterator[str]:
     target, surface = plan.coverage.target.area_m2, plan.coverage.surface.area_m2
+    floor = plan.requirements.region_coverage
     lit: list[list[str]] = []
     measured: list[list[str]] = []
     for row in plan.document.marginal:
@@ -168,7 +179,7 @@ def _marginal(plan: RigPlan) -> Iterator[str]:
                     _ratio(row.lit_target_m2, target),
                     _ratio(row.lit_surface_m2, surface),
                     "" if worst is None else str(worst),
-                    "" if share is None else percent(share),
+                    "" if share is None else percent(share, asked=floor),
                 ]
             )
         else:
@@ -234,5 +245,5 @@ def _cost(plan: RigPlan) -> str:
     return table("Cost", ("term", "value"), rows)
 
 
-def _ratio(part: float, whole: float) -> str:
-    return percent(part / whole) if whole > 0.0 else "undefined"
+def _ratio(part: float, whole: float, asked: float = 0.0) -> str:
+    return percent(part / whole, asked=asked) if whole > 0.0 else "undefined"

@@ -150,21 +150,21 @@ def _check_rows(plan: RigPlan) -> Iterator[tuple[str, str, str, str]]:
         steps = {step.threshold_m: step.fraction for step in check.completeness}
         near = steps[min(steps, key=lambda m: abs(m - limits.tau_m))] if steps else None
     missing = None if check is None else check.predicted_missing
-    for what, bound, value, holds in (
+    least, most = limits.min_completeness, limits.max_predicted_missing
+    for what, bound, told, holds in (
         (
             f"check: has a point within {tau}, of what is predicted measured",
-            f"at least {percent(limits.min_completeness)}",
-            near,
-            near is not None and near >= limits.min_completeness,
+            f"at least {percent(least)}",
+            "" if near is None else percent(near, decimals=2, asked=least),
+            near is not None and near >= least,
         ),
         (
             f"check: has none within {tau} of what is predicted measured",
-            f"at most {percent(limits.max_predicted_missing)}",
-            missing,
-            missing is not None and missing <= limits.max_predicted_missing,
+            f"at most {percent(most)}",
+            "" if missing is None else percent(missing, decimals=2, most=most),
+            missing is not None and missing <= most,
         ),
     ):
-        told = "" if value is None else percent(value, decimals=2)
         yield what, bound, told, _NOT_CHECKED if check is None else _judged(holds)
     if check is not None and not check.passed:
         yield "check", "passed", "failed", _MISSED

@@ -17,7 +17,7 @@ from planning.report.tolerance.robust_lines import robust_cost
 from planning.report.tolerance.survival_lines import losses_words
 
 from .cause_words import causes_line
-from .check_lines import error_words, unchecked
+from .check_lines import error_words, missing_words, unchecked
 from .count_lines import Block, fewest
 from .devices.device_lines import axis_name, devices_words, models_line, standing
 from .devices.station_lines import moves_words, title_words
@@ -221,12 +221,12 @@ def _check(plan: RigPlan) -> Iterator[Block]:
     if rms is None or p95 is None or bias is None:
         yield "CHECK", "FAILED: no point was measured in the rendered pixels", 1
         return
-    limits, gone = plan.requirements.check, check.predicted_missing or 0.0
+    limits, gone = plan.requirements.check, missing_words(check, plan.requirements)
     verdict = "passed" if check.passed else "FAILED"
     yield (
         "CHECK",
         f"{verdict}: {error_words(rms, p95, bias, limits)}, "
-        f"{percent(gone, decimals=2)} missing ({100 * limits.max_predicted_missing:g})",
+        f"{gone} missing ({100 * limits.max_predicted_missing:g})",
         2,
     )
     bounced = check.interreflection

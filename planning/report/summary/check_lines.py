@@ -3,7 +3,7 @@
 from planning.model.document.check_records import ReconstructionRecord
 from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
-from planning.model.requirements import CheckLimits
+from planning.model.requirements import CheckLimits, Requirements
 from planning.model.words import count_words, labelled, percent
 
 from .devices.station_lines import moves_words
@@ -34,7 +34,7 @@ def check_lines(plan: RigPlan) -> list[str]:
         for c in check.completeness
     )
     verdict = "passed" if check.passed else "FAILED"
-    missing = percent(check.predicted_missing or 0.0, decimals=2)
+    missing = missing_words(check, plan.requirements)
     lines = [
         f"{verdict}: reconstructed from rendered pixels, "
         f"{check.n_merged} points of {check.n_points}",
@@ -46,6 +46,12 @@ def check_lines(plan: RigPlan) -> list[str]:
     if bounced and bounced.warning():
         lines.append(f"WARNING: {bounced.warning()}")
     return ["", *labelled("CHECK", lines + _agreement(check))]
+
+
+def missing_words(check: ReconstructionRecord, asked: Requirements) -> str:
+    """Return which share of what was predicted is missing."""
+    gone, most = check.predicted_missing or 0.0, asked.check.max_predicted_missing
+    return percent(gone, decimals=2, most=most)
 
 
 def _left_out(check: ReconstructionRecord) -> str:

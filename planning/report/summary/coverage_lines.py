@@ -32,6 +32,12 @@ def area_rows(plan: RigPlan) -> dict[str, str]:
     return {label: key for label, key in AREA_ROWS.items() if key not in of_light}
 
 
+def reach_asked(plan: RigPlan, key: str) -> float:
+    """Return which share of all an area must be; of most nothing is asked so."""
+    reach = "reachable_by_projectors_m2"
+    return plan.requirements.min_reachable if key == reach else 0.0
+
+
 def coverage_lines(plan: RigPlan) -> list[str]:
     """Return the table of areas, both shares, and what is left uncovered."""
     coverage, document = plan.coverage, plan.document
@@ -50,7 +56,8 @@ def coverage_lines(plan: RigPlan) -> list[str]:
     )
     table = [f"{'':<25}{''.join(f'{title:>24}' for title in columns)}"]
     for label, key in area_rows(plan).items():
-        cells = (area_cell(getattr(a, key), a.area_m2) for a in columns.values())
+        least = reach_asked(plan, key)
+        cells = (area_cell(getattr(a, key), a.area_m2, least) for a in columns.values())
         table.append(f"{label:<25}{''.join(f'{cell:>24}' for cell in cells)}")
     of_light = "" if plan.cameras_alone else f"lit / reachable by projectors {lit}, "
     lines = [
@@ -118,9 +125,11 @@ def _left_words(errors: CalibrationErrors) -> str:
 def _lost_to_mounts(plan: RigPlan) -> list[str]:
     """Say how much more could be reached, were mounts set to anything."""
     coverage, target = plan.coverage, plan.coverage.target
+    least = plan.requirements.min_reachable
     return [
-        f"{step.change} would let {kind} reach {percent(step.reachable_share)} of "
-        f"{whole}, not {percent(share)}"
+        f"{step.change} would let {kind} reach "
+        f"{percent(step.reachable_share, asked=least)} of {whole}, not "
+        f"{percent(share, asked=least)}"
         for kind, whole, share, steps in (
             (
                 "projectors",
@@ -197,11 +206,11 @@ def schedule_lines(document: PlanDocument) -> list[str]:
     ]
 
 
-def area_cell(area_m2: float, whole_m2: float) -> str:
+def area_cell(area_m2: float, whole_m2: float, asked: float = 0.0) -> str:
     """Return an area and its share of a whole, in the unit that suits the whole."""
     small = whole_m2 < _SMALL_M2
     area, unit = (1e6 * area_m2, "mm²") if small else (1e4 * area_m2, "cm²")
-    return f"{area:9.1f} {unit} {percent(area_m2 / whole_m2):>8}"
+    return f"{area:9.1f} {unit} {percent(area_m2 / whole_m2, asked=asked):>8}"
 
 
 def _ratio(part: float, whole: float, asked: float) -> str:
@@ -213,6 +222,7 @@ def marginal_lines(plan: RigPlan) -> list[str]:
     rows, whole = plan.document.marginal, plan.coverage.target.area_m2
     lit = [row for row in rows if isinstance(row, ProjectorMarginal)]
     measured = [row for row in rows if isinstance(row, CameraMarginal)]
+    floor = plan.requirements.region_coverage
     lines = ["what one more or fewer would change (* as planned)"]
     for deed, areas, planned in (
         (
@@ -235,7 +245,7 @@ def marginal_lines(plan: RigPlan) -> list[str]:
         lines.append(f"{deed} of the target   {'   '.join(cells)}")
     worst = [
         f"{row.n_projectors}{'*' * (row.n_projectors == len(plan.projectors))}: "
-        f"region {row.worst_region} {percent(row.worst_region_lit)}"
+        f"region {row.worst_region} {percent(row.worst_region_lit, asked=floor)}"
         for row in lit
         if row.worst_region is not None and row.worst_region_lit is not None
     ]

@@ -43,7 +43,7 @@ def family_rows(plan: RigPlan) -> Iterator[FamilyRow]:
     ):
         remark = " (worst)" if m == family.worst else ""
         remark = " (left out)" if m in family.left_out else remark
-        cells = (f"{record.name}{remark}", *_shares(record), *_exact(record))
+        cells = (f"{record.name}{remark}", *_shares(member), *_exact(record))
         yield FamilyRow((*cells, _own(member)), record.path, m == family.worst)
 
 
@@ -106,14 +106,14 @@ def _hardest(hardest: MemberBound, names: list[str]) -> str:
     return f"the hardest member alone, {names[hardest.member]}, takes {hardest.count}"
 
 
-def _shares(record: MemberRecord) -> Iterator[str]:
-    areas = record.coverage.target
-    for part, whole in (
-        (areas.lit_m2, areas.reachable_by_projectors_m2),
-        (areas.measured_m2, areas.reachable_by_cameras_m2),
-        (areas.measured_m2, areas.area_m2),
+def _shares(member: RigPlan) -> Iterator[str]:
+    areas, required = member.coverage.target, member.requirements
+    for part, whole, asked in (
+        (areas.lit_m2, areas.reachable_by_projectors_m2, required.dominant_coverage),
+        (areas.measured_m2, areas.reachable_by_cameras_m2, required.coverage),
+        (areas.measured_m2, areas.area_m2, 0.0),
     ):
-        yield percent(part / whole) if whole > 0.0 else "none"
+        yield percent(part / whole, asked=asked) if whole > 0.0 else "none"
 
 
 def _exact(record: MemberRecord) -> tuple[str, str]:

@@ -86,6 +86,7 @@ def _small_lines(plan: RigPlan) -> Iterator[str]:
 def region_table(plan: RigPlan) -> list[str]:
     """Return every region in a line: size, cone, shares, by which devices, where."""
     large = {region.id for region in plan.large_regions}
+    asked = plan.requirements.region_coverage
     lines = [
         "lit is the share of what projectors can reach (of the area), measured that of "
         "what cameras can reach (of what is lit)",
@@ -108,9 +109,9 @@ def region_table(plan: RigPlan) -> list[str]:
             if areas.lit_m2
             else "-"
         )
-        shone = "-" if plan.cameras_alone else percent(lit)
+        shone = "-" if plan.cameras_alone else percent(lit, asked=asked)
         reach = "-" if plan.cameras_alone else reach
-        done = percent(measured) if areas.reachable_by_cameras_m2 else "-"
+        done = percent(measured, asked=asked) if areas.reachable_by_cameras_m2 else "-"
         floor = areas.floor or ("none" if region.id in large else "small")
         by = " ".join((*region.lit_by, *areas.measured_by)) or "none"
         lines.append(

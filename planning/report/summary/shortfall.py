@@ -11,8 +11,8 @@ from planning.model.requirements import Requirements
 from planning.model.words import area_words, percent
 from planning.report.entries.survival_entries import falls_short_after
 from planning.report.tolerance.survival_lines import (
-    lit_share,
-    measured_share,
+    lit_words,
+    measured_words,
     pairs_words,
 )
 from planning.scene.limits.limit import causes
@@ -113,8 +113,7 @@ def _surviving(plan: RigPlan) -> Iterator[Shortfall]:
             continue
         where = f"without {loss.lost}" if loss.lost else "with all devices there"
         by = f" by {pairs_words(asked.views)}" if asked.views > 1 else ""
-        lit = percent(lit_share(loss), asked=required.dominant_coverage)
-        measured = percent(measured_share(loss), asked=required.coverage)
+        lit, measured = lit_words(plan, loss), measured_words(plan, loss)
         figure = f"{where} lit {lit} and measured{by} {measured} of what can be"
         regions = ", ".join(map(str, loss.floors_missed))
         floors = f"; region {regions} falls below its floor" if regions else ""

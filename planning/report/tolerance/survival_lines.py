@@ -23,8 +23,8 @@ def survival_lines(plan: RigPlan) -> list[str]:
         f"any {count_words(asked.survive, 'device')} may be lost, what counts is "
         f"measured by {pairs_words(asked.views)} at least",
         *(
-            f"{loss.lost or 'all there':<{width}}  lit {percent(lit_share(loss))}, "
-            f"measured {percent(measured_share(loss))} of what can be"
+            f"{loss.lost or 'all there':<{width}}  lit {lit_words(plan, loss)}, "
+            f"measured {measured_words(plan, loss)} of what can be"
             f"{_of_target(plan, loss)}{_regions(loss)}{_short(plan, loss)}"
             for loss in record.losses
         ),
@@ -122,8 +122,8 @@ def worst_losses(plan: RigPlan) -> str:
         return ""
     dark, blind = min(losses, key=lit_share), min(losses, key=measured_share)
     return (
-        f"at worst lit {percent(lit_share(dark))} without {dark.lost} and measured "
-        f"{percent(measured_share(blind))} without {blind.lost}"
+        f"at worst lit {lit_words(plan, dark)} without {dark.lost} and measured "
+        f"{measured_words(plan, blind)} without {blind.lost}"
     )
 
 
@@ -137,6 +137,16 @@ def measured_share(loss: LossRecord) -> float:
     """Measured of what can be."""
     whole = loss.reachable_by_cameras_m2
     return loss.measured_m2 / whole if whole > 0.0 else 0.0
+
+
+def lit_words(plan: RigPlan, loss: LossRecord) -> str:
+    """Return that share in percent, rounded down if less than is asked."""
+    return percent(lit_share(loss), asked=plan.requirements.dominant_coverage)
+
+
+def measured_words(plan: RigPlan, loss: LossRecord) -> str:
+    """Likewise of what is measured."""
+    return percent(measured_share(loss), asked=plan.requirements.coverage)
 
 
 def pairs_words(views: int) -> str:

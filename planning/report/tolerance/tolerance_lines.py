@@ -64,9 +64,9 @@ def _table(found: Tolerance) -> Iterator[str]:
     heads = ("as planned", "5 %", "50 %", "95 %")
     yield f"{'':41}" + "".join(f"{head:>12}" for head in heads) + f"{'asked':>12}"
     for name in TOLD:
-        cells = [_cell(name, getattr(found.planned, name))]
-        cells += [_cell(name, value) for value in found.quantiles(name)]
         asked = getattr(found.asked, name, None)
+        values = (getattr(found.planned, name), *found.quantiles(name))
+        cells = [_cell(name, value, asked) for value in values]
         sign = "<=" if name in _ERRORS else ">="
         cells.append("" if asked is None else f"{sign} {_cell(name, asked).strip()}")
         yield (
@@ -77,10 +77,12 @@ def _table(found: Tolerance) -> Iterator[str]:
     yield ""
 
 
-def _cell(name: str, value: float | None) -> str:
+def _cell(name: str, value: float | None, asked: float | None = None) -> str:
     if value is None:
         return "-"
-    return f"{1e3 * value:.3f}" if name in _ERRORS else percent(value, decimals=2)
+    if name in _ERRORS:
+        return f"{1e3 * value:.3f}"
+    return percent(value, decimals=2, asked=asked or 0.0)
 
 
 def _met(found: Tolerance) -> Iterator[str]:
@@ -88,8 +90,9 @@ def _met(found: Tolerance) -> Iterator[str]:
     if not n:
         yield "no rig was drawn"
         return
+    share = percent(found.n_met / n, asked=found.quantile)
     yield (
-        f"{found.n_met} of {n} rigs ({percent(found.n_met / n)}) meet every "
+        f"{found.n_met} of {n} rigs ({share}) meet every "
         f"requirement; {percent(found.quantile)} are asked: "
         f"{'enough' if found.passed else 'NOT ENOUGH'}"
     )
