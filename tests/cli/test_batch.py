@@ -156,6 +156,25 @@ def test_a_part_that_fails_now_doesn_t_show_its_older_plan(done, tmp_path, monke
         assert [page.count(word) for word in shown] == [n, n]
 
 
+@pytest.mark.parametrize("words", [["--again"], ["--coverage", "0.9"]])
+def test_a_part_that_failed_since_isn_t_planned_again(
+    done, tmp_path, monkeypatch, words
+):
+    again = tmp_path / "copy"
+    shutil.copytree(done[0], again)
+    asked = (again / "parts", "-o", again / "out", "--rig", again / "few.toml", *FAST)
+    (_, before), begun = rows(again / "out"), _counted(monkeypatch)
+    for _ in range(2):
+        run(*asked, "--no-report", *words)
+        _, failed = rows(again / "out")
+        assert (failed["verdict"], failed["measured"]) == ("failed", "")
+    begun.clear()
+    run(*asked, "--no-report")
+    _, block = rows(again / "out")
+    assert begun == ["broken.stl"]
+    assert block == before | {"seconds": ""}
+
+
 @pytest.mark.parametrize("how", ["stands", "gone", "taken"])
 def test_a_run_over_some_parts_keeps_the_rows_of_plans_that_stand(
     done, tmp_path, monkeypatch, how
@@ -306,7 +325,6 @@ def test_a_table_is_read_as_it_was_written(done, tmp_path):
     block = before["sub/block.obj"]
     assert is_whole(block, place / "out")
     assert not is_whole(replace(block, content="0"), place / "out")
-    assert not is_whole(replace(block, exit=130), place / "out")
     (tmp_path / "batch.csv").write_text("no table")
     assert read_rows(tmp_path) == {}
 

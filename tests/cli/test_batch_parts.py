@@ -170,6 +170,23 @@ def test_each_part_is_asked_what_the_batch_is(tmp_path, monkeypatch, words):
     assert sorted(told) == sorted(("--max-projectors", "4", *words))
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--unit", "mm", "--size-mm", "100"),
+        ("--max-heads", "2"),
+        ("--pattern", "dense", "--ring-axis", "free"),
+        ("--pattern", "none"),
+    ],
+)
+def test_options_that_exclude_each_other_are_refused_at_once(tmp_path, begun, words):
+    made(tmp_path / "in", "a.obj", "b.obj")
+    ended = run(tmp_path / "in", "-o", tmp_path / "out", *words)
+    assert (ended.exit_code, begun) == (2, [])
+    assert not (tmp_path / "out").exists()
+    assert words[0] in ended.stderr
+
+
 @pytest.mark.parametrize("room", ["verify", "handover", "experiments", "cli", "steps"])
 def test_rows_and_workers_are_of_the_same_code_in_all_rooms(
     tmp_path, monkeypatch, begun, room

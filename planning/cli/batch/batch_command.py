@@ -18,7 +18,17 @@ from planning.model.words import count_words
 
 from .index_page import NAME as INDEX
 from .index_page import write_index
-from .ledger import NAME, Row, asked_of, is_whole, read_rows, row_of, write_rows
+from .ledger import (
+    NAME,
+    Row,
+    asked_of,
+    beside_plan,
+    finished,
+    is_whole,
+    read_rows,
+    row_of,
+    write_rows,
+)
 from .part_names import one_line
 from .part_task import NO_FILE, PartEnd, PartTask, stop_parts
 from .parts import Part, find_parts
@@ -78,7 +88,8 @@ class _Batch:
             asked = self.asked[part.name] = asked_of(task)
             row = None if again else self.before.get(part.name)
             if row is not None and row.asked == asked and is_whole(row, self.out):
-                self.rows[part.name] = row
+                check = "--no-check" not in self.words
+                row = self.rows[part.name] = finished(row, self.out, check=check)
                 self.report(f"{part.name}: {row.verdict}, from an earlier run")
                 self.show(len(self.rows), self.running)
                 continue
@@ -98,6 +109,7 @@ class _Batch:
             code = NO_FILE if isinstance(error, OSError) else _NO_PLAN
             failed = replace(end, code=code, message=one_line(str(error)))
             row = row_of(failed, "", self.out, "")
+        row = beside_plan(row, self.before.get(end.name))
         self.rows[end.name] = row
         if end.name in self.running:
             self.running.remove(end.name)

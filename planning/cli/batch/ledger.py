@@ -15,10 +15,13 @@ from planning.model.document.made_with import MadeWith
 from planning.model.files import write_atomically
 from planning.model.plan import RigPlan
 from planning.report.summary.shortfall import missing
+from planning.steps.checked import missed_by
 
 from .part_task import PartEnd, PartTask
 
 NAME = "batch.csv"
+# What tells which plan stands, and where.
+_OF_PLAN = ("folder", "asked", "digest", "files", "content")
 _VERDICTS = {0: "met", 1: "NOT MET", 130: "interrupted"}
 
 
@@ -41,7 +44,9 @@ class Row:
         rms_mm: Of the check from pixels.
         seconds: Wall time of the run.
         message: Why not, in a line.
-        asked: Hash of the mesh file and of everything that is asked.
+        asked: Hash of the mesh file and of everything that is asked. Where a part
+            failed, this and what follows are of the plan that an earlier run left, if
+            one did.
         digest: Of the plan (`RigPlan.digest`).
         files: What its run wrote into the folder: files and folders, by their names.
         content: Hash of all of it.
@@ -114,6 +119,27 @@ def row_of(end: PartEnd, folder: str, out: Path, asked: str) -> Row:
     return _with_plan(replace(row, files=written, content=content), plan)
 
 
+def beside_plan(row: Row, before: Row | None) -> Row:
+    """Return the row of a part that failed as it also tells what an earlier run left.
+
+    That plan stands, and needn't be made again where the same is asked again.
+    """
+    if not row.failed or before is None or not before.content:
+        return row
+    kept = {name: getattr(before, name) for name in _OF_PLAN}
+    return replace(row, **kept)
+
+
+def finished(row: Row, out: Path, *, check: bool) -> Row:
+    """Return the row of a plan that is whole, also where a later run of it failed."""
+    if not row.failed:
+        return row
+    plan = RigPlan.load(out / row.folder / "plan.json")
+    code = 1 if missed_by(plan, check=check) else 0
+    kept = {name: getattr(row, name) for name in _OF_PLAN}
+    return _with_plan(Row(row.part, exit=code, verdict=_VERDICTS[code], **kept), plan)
+
+
 def _with_plan(row: Row, plan: RigPlan) -> Row:
     areas, proofs = plan.coverage.target, plan.document.certificates
     asked = plan.requirements
@@ -173,8 +199,6 @@ def read_rows(out: Path) -> Mapping[str, Row]:
 
 def is_whole(row: Row, out: Path) -> bool:
     """Return whether all that a part's run wrote stands in its folder as it was."""
-    if row.failed:
-        return False
     folder = out / row.folder
     own = [folder / name for name in row.files.split()]
     with suppress(OSError):

@@ -9,7 +9,7 @@ from click.core import ParameterSource
 
 from planning.cli.console import output_options, run
 
-from .plan_checks import check_projectors
+from .plan_checks import check_each, check_projectors
 from .plan_declared import GroupedCommand, rig_command
 
 # What is said of one mesh, or of the whole batch.
@@ -68,6 +68,7 @@ def batch(given: tuple[str, ...], **options: Any) -> None:  # noqa: ANN401
     """
     from planning.cli.batch.batch_command import batch_command
 
+    check_each(options)
     check_projectors(options)
     words = list(_words(click.get_current_context()))
     run(lambda: batch_command(options, given, words), debug=options["debug"])

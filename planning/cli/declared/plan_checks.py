@@ -15,9 +15,18 @@ def check_options(options: dict[str, Any]) -> None:
     """
     options["meshes"] += options.pop("files")
     _check_source(options)
+    _check_target(options)
+    check_each(options)
+
+
+def check_each(options: dict[str, Any]) -> None:
+    """Refuse options that exclude each other whatever is measured.
+
+    Raises:
+        click.UsageError: It names them.
+    """
     if options["unit"] and options["size_mm"] is not None:
         raise click.UsageError("give --unit or --size-mm, not both")
-    _check_target(options)
     if options["max_heads"] is not None:
         for name in ("max_projectors", "max_cameras"):
             if options[name] is not None:
