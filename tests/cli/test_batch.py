@@ -156,6 +156,29 @@ def test_a_part_that_fails_now_doesn_t_show_its_older_plan(done, tmp_path, monke
         assert [page.count(word) for word in shown] == [n, n]
 
 
+def test_batches_into_one_folder_keep_each_other_s_rows(done, tmp_path, monkeypatch):
+    again = tmp_path / "copy"
+    shutil.copytree(done[0], again)
+    for name in ("c", "d"):
+        (again / name).mkdir()
+        (again / name / f"{name}.stl").write_text("no mesh")
+    asked = ("-o", again / "out", "--rig", again / "few.toml", *FAST, "--no-report")
+
+    def planned(task):
+        if task.name == "c.stl":
+            # Meanwhile another one begins and ends: of a part that this one left, too.
+            run(again / "d", again / "parts", *asked, "--seed", "1")
+        return PartEnd(task.name, 3, task.name, 0.0, {})
+
+    monkeypatch.setattr(runners, "plan_part", planned)
+    _, block = rows(again / "out")
+    run(again / "c", again / "parts", *asked, "--jobs", 1)
+    told = {row["part"]: row["message"] for row in rows(again / "out")}
+    names = ("broken.stl", "c.stl", "d.stl", "sub/block.obj")
+    assert told == {name: name for name in names}
+    assert rows(again / "out")[-1]["digest"] == block["digest"]
+
+
 @pytest.mark.parametrize("words", [["--again"], ["--coverage", "0.9"]])
 def test_a_part_that_failed_since_isn_t_planned_again(
     done, tmp_path, monkeypatch, words

@@ -25,6 +25,7 @@ from .ledger import (
     beside_plan,
     finished,
     is_whole,
+    locked,
     read_rows,
     row_of,
     write_rows,
@@ -47,7 +48,7 @@ class _Batch:
 
     Attributes:
         threads: Of each part's process.
-        before: Rows of an earlier run.
+        before: Rows of earlier runs, as this one began.
         rows: Of the parts that ended in this one, or are left as they are.
         asked: Hash of all that each part's plan follows from.
         running: Names of the parts that were given away to be planned, and haven't
@@ -109,7 +110,6 @@ class _Batch:
             code = NO_FILE if isinstance(error, OSError) else _NO_PLAN
             failed = replace(end, code=code, message=one_line(str(error)))
             row = row_of(failed, "", self.out, "")
-        row = beside_plan(row, self.before.get(end.name))
         self.rows[end.name] = row
         if end.name in self.running:
             self.running.remove(end.name)
@@ -120,10 +120,18 @@ class _Batch:
         self.show(len(self.rows), self.running)
 
     def write(self) -> None:
-        """Write the table and the page of what ended so far, in earlier runs too."""
-        rows = [*{**self.before, **self.rows}.values()]
-        write_rows(rows, self.out)
-        write_index(rows, self.out)
+        """Write the table and the page of what ended so far, in other runs too."""
+        with locked(self.out):
+            # Another batch may have written since this one began.
+            now = {**self.before, **_before(self.parts, self.out)}
+            ours = {
+                name: beside_plan(row, now.get(name))
+                for name, row in self.rows.items()
+                if row != self.before.get(name)
+            }
+            rows = [*{**now, **ours}.values()]
+            write_rows(rows, self.out)
+            write_index(rows, self.out)
 
 
 def _keep(files: Mapping[str, bytes], folder: Path) -> None:

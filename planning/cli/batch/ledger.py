@@ -4,8 +4,9 @@ import csv
 import hashlib
 import io
 import json
-from collections.abc import Iterable, Mapping
-from contextlib import suppress
+import os
+from collections.abc import Generator, Iterable, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from platform import machine
@@ -170,6 +171,20 @@ def _with_plan(row: Row, plan: RigPlan) -> Row:
 def _share(part: float, whole: float) -> str:
     # To the last digit: whoever shows it rounds once.
     return str(part / whole) if whole > 0.0 else ""
+
+
+@contextmanager
+def locked(out: Path) -> Generator[None]:
+    """Keep other batches from this folder's table meanwhile, where the system can."""
+    with ExitStack() as stack:
+        # Windows has no `fcntl`, and some network folders no locks.
+        with suppress(ImportError, OSError):
+            from fcntl import LOCK_EX, flock
+
+            handle = os.open(out, os.O_RDONLY)
+            stack.callback(os.close, handle)
+            flock(handle, LOCK_EX)
+        yield
 
 
 def write_rows(rows: Iterable[Row], out: Path) -> None:
