@@ -46,8 +46,8 @@ class FamilyRequest:
 
     @property
     def n_asked(self) -> int:
-        """Members that must be served."""
-        return math.ceil(self.quantile * len(self.names) - 1e-9)
+        """Members that must be served, one at least."""
+        return max(1, math.ceil(self.quantile * len(self.names) - 1e-9))
 
 
 @dataclass(frozen=True, eq=False)

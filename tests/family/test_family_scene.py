@@ -124,6 +124,13 @@ def test_a_share_of_members_must_be_one(quantile):
         family_of([sphere(SMALL)] * 2, "given", quantile)
 
 
+@pytest.mark.parametrize(
+    ("quantile", "n_asked"), [(1e-10, 1), (0.5, 1), (0.51, 2), (1.0, 2)]
+)
+def test_a_rig_serves_one_member_at_least(quantile, n_asked):
+    assert family_of([sphere(SMALL)] * 2, "given", quantile).n_asked == n_asked
+
+
 def test_a_selection_is_of_one_mesh():
     with pytest.raises(InputError, match="selection"):
         check_members(Wishes(max_projectors=1), selected=True)
