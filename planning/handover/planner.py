@@ -6,6 +6,8 @@ from functools import wraps
 from itertools import product
 from typing import Any, ParamSpec
 
+import numpy as np
+
 from geometry.mesh.mesh import TriangleMesh
 from planning import pipeline
 from planning.cache.cache import Cache
@@ -14,6 +16,7 @@ from planning.model.plan import InterruptedPlanError, RequirementError, RigPlan
 from planning.model.progress import Report
 from planning.rig.rig import Rig
 from planning.scene.ranges.ranged_body import RangedBody
+from planning.steps.refused import check_values
 
 from .handed_plan import HandedPlan
 from .plan_tables import Row, Table, table
@@ -77,7 +80,11 @@ def prepare(
             what the command line left is used, too, and the other way round.
         asked: Options of `plan_rig` that every plan has unless it is given others:
             `max_projectors=4`, so that there are devices to plan.
+
+    Raises:
+        InputError: If that is no mesh, or no rig.
     """
+    check_values({"mesh": mesh, "rig": rig})
     return Planner(mesh, rig, cache or Cache.in_memory(), asked)
 
 
@@ -105,8 +112,9 @@ def sweep(
         why: a pandas frame where pandas is there, else a list of rows.
 
     Raises:
-        InputError: If a setting is none of the rig file's.
+        InputError: If a setting is none of the rig file's, or its values no list.
     """
+    _check_sweep(mesh, rig, grid, asked)
     rows: list[Row] = []
     asked = {"cache": Cache.in_memory(), **asked}
     for values in product(*grid.values()):
@@ -121,6 +129,21 @@ def sweep(
         except InfeasibleLimitsError as error:
             rows.append(settings | {"met": False, "why": str(error)})
     return table(rows)
+
+
+def _check_sweep(
+    mesh: object, rig: object, grid: Mapping[str, Any], asked: Mapping[str, Any]
+) -> None:
+    check_values({"mesh": mesh, "rig": rig})
+    for name, values in grid.items():
+        if isinstance(values, str) or not np.iterable(values):
+            raise InputError(
+                f"grid[{name!r}] = {values!r} must be a list of values: write "
+                f"[{values!r}]"
+            )
+    for name in ("mesh", "rig", "on_miss"):
+        if name in asked or name in grid:
+            raise InputError(f"{name} is sweep's own: leave it out of asked and grid")
 
 
 def _tables(settings: Mapping[str, Any]) -> dict[str, dict[str, Any]]:

@@ -1,19 +1,24 @@
 """What can't be asked at all, or not together, told before any work."""
 
-from collections.abc import Mapping
-from typing import TypeGuard, get_args
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeGuard, cast, get_args
 
 import numpy as np
 
+from geometry.mesh.mesh import TriangleMesh
 from planning.cache.cache import Cache
 from planning.model.document.certificates import CamerasBy
 from planning.model.document.family_records import AlignedBy
 from planning.model.document.ring_records import RingAxis
 from planning.model.errors import InputError
 from planning.report.partial_plan import PlanRequest
+from planning.rig.mounted import Mounted
+from planning.rig.rig import Rig
+from planning.scene.ranges.ranged_body import RangedBody
 
 from .asked.family_request import check_family
 from .cameras_alone.refusals import check_alone
+from .front.taken_point import TakenPoint
 from .joint.joining import check_joint
 from .stations.carried import check_carried
 from .surviving import check_survival
@@ -35,7 +40,20 @@ _NUMBERS = (
     *("coverage", "dominant_coverage", "min_reachable", "region_coverage"),
     *("accuracy_mm", "family_quantile", "robust", "time_limit"),
 )
-_NEVER_NONE = ("seed", "survive", "family_quantile")
+_NEVER_NONE = ("seed", "survive", "family_quantile", "mesh", "rig", "cache")
+# Of those that no text and no number stands for: their types, and where they are from.
+_TYPES: dict[str, tuple[Any, str]] = {
+    "rig": (Rig, "a Rig; load_rig reads one by its name or file"),
+    "cache": (Cache, "a Cache; leave it out to keep nothing"),
+    "fixed": (Mounted, "a Mounted; read_mounted reads one from a file"),
+    "take": (TakenPoint, "a TakenPoint; `plan --take` makes one of a kept front"),
+    "progress": ((Callable, bool), "a function of a line, True or False"),
+}
+_MESH = "a mesh from load_mesh, a list of such, or a body from read_ranges"
+
+
+# Of what is told of a value [characters].
+_LONGEST = 60
 
 
 def check_values(asked: Mapping[str, object]) -> None:
@@ -46,23 +64,36 @@ def check_values(asked: Mapping[str, object]) -> None:
     """
     for name, value in asked.items():
         if must := _must_be(name, value):
-            raise InputError(f"{name} = {value!r} must be {must}")
+            told = repr(value)
+            if len(told) > _LONGEST or "\n" in told:
+                told = f"a {type(value).__name__}"
+            raise InputError(f"{name} = {told} must be {must}")
 
 
 def _must_be(name: str, value: object) -> str:
     """Return what the value of an option must be and isn't; empty: it may be that."""
-    if name in _VALUES and value not in _VALUES[name]:
+    # An array has no truth.
+    if name in _VALUES and (np.ndim(cast(Any, value)) or value not in _VALUES[name]):
         return f"one of {', '.join(map(str, _VALUES[name]))}"
-    if name == "cache" and not isinstance(value, Cache):
-        return "a Cache; leave it out to keep nothing"
     if value is None and name not in _NEVER_NONE:
         return ""
+    if name == "mesh" and not _meshes(value):
+        return _MESH
+    if name in _TYPES and not isinstance(value, _TYPES[name][0]):
+        return _TYPES[name][1]
     if name in _LEAST and not (_whole(value) and value >= _LEAST[name]):
         return f"a whole number, {_LEAST[name]} or more"
     real = isinstance(value, float | np.floating) and not np.isnan(value)
     if name in _NUMBERS and not (real or _whole(value)):
         return "a number"
     return ""
+
+
+def _meshes(value: object) -> bool:
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        every = cast(Sequence[object], value)
+        return all(isinstance(one, TriangleMesh) for one in every)
+    return isinstance(value, TriangleMesh | RangedBody)
 
 
 def _whole(value: object) -> TypeGuard[int]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support.plain_shapes import box
 
-from planning import InputError, load_rig, plan_rig
+from planning import InputError, load_rig, plan_rig, prepare, sweep
 from planning.steps.refused import check_values
 
 NAN = float("nan")
@@ -39,6 +39,56 @@ def test_a_wrong_value_is_named_with_what_it_must_be(monkeypatch, name, values, 
         with pytest.raises(InputError) as told:
             plan_rig(box((0.1, 0.06, 0.03)), load_rig(), **asked)
         assert str(told.value) == f"{name} = {value!r} must be {rule}"
+
+
+MESH, RIG = box((0.1, 0.06, 0.03)), load_rig()
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "told"),
+    [
+        ("mesh", "part.obj", "'part.obj' must be a mesh from load_mesh"),
+        ("mesh", ["part.obj"], "['part.obj'] must be a mesh from load_mesh"),
+        ("mesh", None, "None must be a mesh"),
+        ("mesh", MESH.vertices, "a ndarray must be a mesh"),
+        ("mesh", (one for one in [MESH]), "must be a mesh from load_mesh, a list"),
+        ("rig", "default", "'default' must be a Rig; load_rig reads one"),
+        ("rig", None, "None must be a Rig"),
+        ("fixed", "plan.json", "'plan.json' must be a Mounted; read_mounted"),
+        ("take", (3, 4), "(3, 4) must be a TakenPoint"),
+        ("progress", 5, "5 must be a function"),
+        ("align", np.array(["icp", "axes"]), "must be one of given, axes, icp"),
+        ("align", np.array(["icp"]), "must be one of given, axes, icp"),
+    ],
+)
+def test_what_is_of_another_type_is_refused_with_where_to_get_one(name, value, told):
+    asked = {"mesh": MESH, "rig": RIG, "max_projectors": 1, name: value}
+    calls = [plan_rig]
+    calls += [prepare] * (name in ("mesh", "rig"))
+    for call in calls:
+        with pytest.raises(InputError) as error:
+            call(**asked)
+        assert str(error.value).startswith(f"{name} = ")
+        assert told in str(error.value)
+        assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("changed", "told"),
+    [
+        ({"grid": {"coverage": 0.9}}, "grid['coverage'] = 0.9 must be a list"),
+        ({"grid": {"target": "surface"}}, "grid['target'] = 'surface' must be a list"),
+        ({"asked": {"on_miss": "raise"}}, "on_miss is sweep's own"),
+        ({"grid": {"rig": [RIG]}}, "rig is sweep's own"),
+        ({"mesh": "part.obj"}, "mesh = 'part.obj' must be a mesh"),
+        ({"rig": "default"}, "rig = 'default' must be a Rig"),
+    ],
+)
+def test_a_sweep_refuses_the_same(changed, told):
+    asked = {"mesh": MESH, "rig": RIG, "grid": {}, "asked": {"max_projectors": 1}}
+    with pytest.raises(InputError) as error:
+        sweep(**(asked | changed))
+    assert str(error.value).startswith(told)
 
 
 def test_numbers_of_numpy_and_options_left_out_are_taken():
