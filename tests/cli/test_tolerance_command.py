@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 
 import pytest
 from click.testing import CliRunner
@@ -6,6 +7,13 @@ from support.little_work import draw_fewer
 
 from planning.cli.declared.tolerance_declared import Quantities, tolerance
 from planning.cli.main import commands
+from planning.model.plan import RigPlan
+
+_BOUND = {"member": 0, "count": 2, "lower_bound": 2}
+_COUNT = {"count": 2, "needed": 2, "lower_bound": 2, "n_candidates": 9, "n_samples": 9}
+_COUNT |= {"proof": "", "hardest": _BOUND}
+FAMILY = {"align": "given", "quantile": 1.0, "n_asked": 2, "worst": 0}
+FAMILY |= {"projectors": _COUNT, "cameras": _COUNT}
 
 
 @pytest.mark.parametrize(
@@ -59,3 +67,15 @@ def test_a_plan_file_becomes_a_verdict(handmade, tmp_path, monkeypatch):
     assert (tmp_path / "tolerance.json").exists()
     rig = CliRunner().invoke(commands, ["tolerance", str(tmp_path / "no.json")])
     assert rig.exit_code == 3
+
+
+def test_a_family_is_refused_and_its_members_named(handmade, tmp_path, monkeypatch):
+    """Rigs were drawn for the worst member, and "every requirement" was said of it."""
+    plan = handmade.build_plan()
+    family = replace(plan, document=plan.document.changed(family=FAMILY))
+    monkeypatch.setattr(RigPlan, "load", lambda path: family)
+    ended = CliRunner().invoke(commands, ["tolerance", str(tmp_path), "--draws", "3"])
+    assert ended.exit_code == 3
+    (line,) = ended.stderr.splitlines()
+    assert "(members/NAME)" in line
+    assert not [*tmp_path.iterdir()]

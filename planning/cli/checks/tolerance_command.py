@@ -20,6 +20,11 @@ def tolerance_command(options: Mapping[str, Any]) -> int:
     """Draw rigs and print what becomes of the plan; 0 if enough meet what is asked."""
     path = options["plan_file"]
     plan = RigPlan.load(path)
+    if plan.document.family is not None:
+        raise InputError(
+            f"{path}: rigs are drawn for one mesh, and this plan is a family's: name "
+            f"the plan of a member (members/NAME)"
+        )
     if not plan.projectors or not plan.cameras:
         raise InputError(
             f"{path}: a rig without projectors or cameras measures nothing"
