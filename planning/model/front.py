@@ -8,8 +8,6 @@ from pydantic import Field
 from planning.model.document.part import Count, Part
 from planning.model.document.ring_records import AxisTaken
 
-# Coverage and deviations are compared as they are printed: 0.1 %, 0.001 mm.
-_SHARE, _LENGTH_M = 1e-3, 1e-6
 # Standard errors by which a bound of samples is raised, to speak of others too.
 _ERRORS = 2.0
 
@@ -101,8 +99,9 @@ def marked(points: tuple[FrontPoint, ...], area_m2: float) -> tuple[FrontPoint, 
 
     def figures(one: FrontPoint) -> tuple[float, ...]:
         sigma = one.sigma_p95_m
-        exact = float("inf") if sigma is None else round(sigma / _LENGTH_M)
-        covered = round(one.measured_m2 / area_m2 / _SHARE)
+        # As they are printed: of a product, which no quotient rounds like.
+        exact = math.inf if sigma is None else round(1e3 * sigma, 3)
+        covered = round(100.0 * (one.measured_m2 / area_m2), 1)
         return one.projectors, one.cameras, -covered, exact
 
     every = [figures(one) for one in points]

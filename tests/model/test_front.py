@@ -4,6 +4,7 @@ import pytest
 
 from planning.cli.lines.front_lines import front_lines
 from planning.model.front import Front, FrontPoint, marked
+from planning.model.words import percent
 
 
 def point(p, c, measured, sigma, **others):
@@ -64,6 +65,17 @@ def test_what_prints_alike_is_alike():
     assert on_front(few, point(1, 3, 0.8004, 1.997e-4)) == [(1, 2)]
     # Shares are of the target, whatever its area.
     assert on_front(few, point(1, 3, 0.8004, 2e-4), area=0.1) == [(1, 2), (1, 3)]
+
+
+def test_a_mark_never_contradicts_what_is_printed():
+    """Halves of the last digit are rounded as they are printed."""
+    for n in range(6, 12_000, 12):
+        few, many, fine = n / 12_000, (n + 1) / 12_000, n / 12e6
+        better = on_front(point(2, 3, few, 2e-4), point(2, 4, many, 2e-4))
+        assert len(better) == len({percent(few), percent(many)})
+        finer = on_front(point(2, 3, few, fine + 1e-9), point(2, 4, few, fine))
+        told = {f"{1e3 * (fine + 1e-9):.3f}", f"{1e3 * fine:.3f}"}
+        assert len(finer) == len(told)
 
 
 def test_points_of_equal_figures_and_counts_dont_drop_each_other():
