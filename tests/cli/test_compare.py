@@ -41,12 +41,12 @@ OTHERWISE = {
     "max_projectors": (6, "projectors, at most", "4", "6"),
     "max_cameras": (8, "cameras, at most", "-", "8"),
     "max_heads": (2, "heads, at most", "-", "2"),
-    "min_reachable": (0.5, "reachable, asked", "90.0 %", "50.0 %"),
-    "region_coverage": (0.8, "of each region, asked", "0.0 %", "80.0 %"),
+    "min_reachable": (0.5, "reachable, asked", "90 %", "50 %"),
+    "region_coverage": (0.8, "of each region, asked", "0 %", "80 %"),
     "accuracy_of": ("noise", "sigma, asked of", "total", "noise"),
     "up": ("-x", "up", "z", "-x"),
     "ring_axis": ("free", "ring axis, asked", "centred", "free"),
-    "robust": (0.8, "drawn rigs that meet it, asked", "-", "80.0 %"),
+    "robust": (0.8, "drawn rigs that meet it, asked", "-", "80 %"),
     "views": (3, "views, asked", "-", "3"),
     "survive": (1, "losses, asked", "0", "1"),
     "joint": (True, "sought jointly", "no", "yes"),
@@ -106,6 +106,27 @@ def test_what_else_was_asked_is_told_where_it_differs(plan, handmade, key):
     assert (row.what, row.first, row.second) == (name, first, second)
     # Nothing is said of what neither plan's command changed.
     assert len(rows) == len(compared(plan, plan)) + 1
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "told"),
+    [
+        ("coverage", (0.9496, 0.9504), ("94.96 %", "95.04 %")),
+        ("dominant_coverage", (0.57, 0.5701), ("57 %", "57.01 %")),
+        ("max_sigma_m", (3.001e-4, 3.004e-4), ("0.3001", "0.3004")),
+    ],
+)
+def test_what_is_asked_otherwise_doesn_t_look_alike(plan, handmade, name, values, told):
+    def asked(value):
+        def change(document):
+            table = document["requirements"]
+            table = table["triangulation"] if name == "max_sigma_m" else table
+            table[name] = value
+
+        return handmade.tampered(plan, change)
+
+    rows = compared(*map(asked, values))
+    assert told in [(row.first, row.second) for row in rows if row.differs]
 
 
 def test_all_that_was_asked_is_told():

@@ -133,6 +133,6 @@ def test_a_rig_file_that_is_saved_is_planned_again_and_what_changed_is_told(watc
     assert "rig.toml" in broken[0]
     rig.write_text(text + "coverage = 0.8\n")
     said = until("waiting for")
-    assert any("changed: measured, asked 95.0 % -> 80.0 %" in line for line in said)
+    assert any("changed: measured, asked 95 % -> 80 %" in line for line in said)
     run.send_signal(signal.SIGINT)
     assert run.wait(timeout=60.0) == 0

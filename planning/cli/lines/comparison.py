@@ -90,9 +90,10 @@ def _asked(plan: RigPlan) -> Iterator[tuple[str, str]]:
     yield "target", asked.target
     yield "pattern", asked.pattern
     if not plan.cameras_alone:
-        yield "lit, asked", percent(asked.dominant_coverage)
-    yield "measured, asked", percent(asked.coverage)
-    yield "sigma, asked [mm]", _mm(asked.triangulation.max_sigma_m)
+        yield "lit, asked", _words(asked.dominant_coverage)
+    yield "measured, asked", _words(asked.coverage)
+    limit = asked.triangulation.max_sigma_m
+    yield "sigma, asked [mm]", _NONE if limit is None else _exact(1e3 * limit)
     yield "requirements missed", str(len(list(missing(plan))))
 
 
@@ -109,7 +110,12 @@ def _words(value: str | float | bool | None) -> str:
         return _NONE
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return percent(value) if isinstance(value, float) else str(value)
+    return f"{_exact(100 * value)} %" if isinstance(value, float) else str(value)
+
+
+def _exact(asked: float) -> str:
+    # Two that differ must not look alike, and 57 is no 56.99999999999999.
+    return f"{asked:.10g}"
 
 
 def _devices(plan: RigPlan) -> Iterator[tuple[str, str]]:
