@@ -114,9 +114,12 @@ def _at_most(pieces: Iterable[bytes]) -> bytes:
 def is_mesh_name(name: str) -> bool:
     """Return whether a file is read as a mesh, by its name; what it holds may not be.
 
-    A .zip is, though it may hold none.
+    A .zip is, though it may hold none. Hidden files, as macOS leaves beside others,
+    are none.
     """
     path = PurePosixPath(name.lower())
+    if path.name.startswith("."):
+        return False
     if path.suffix in (".gz", ".bz2"):
         path = path.with_suffix("")
     return path.suffix.lstrip(".") in (*SUPPORTED, "zip")

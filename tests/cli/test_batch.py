@@ -17,7 +17,7 @@ from support.plain_shapes import box
 
 from planning.cli.batch import batch_command, part_task, runners
 from planning.cli.batch.index_page import write_index
-from planning.cli.batch.ledger import is_whole, read_rows, row_of, write_rows
+from planning.cli.batch.ledger import Row, is_whole, read_rows, row_of, write_rows
 from planning.cli.batch.part_task import PartEnd, PartTask, plan_part
 from planning.cli.batch.parts import find_parts
 from planning.cli.batch.sent_files import part_files, rig_files
@@ -350,6 +350,18 @@ def test_a_table_is_read_as_it_was_written(done, tmp_path):
     assert not is_whole(replace(block, content="0"), place / "out")
     (tmp_path / "batch.csv").write_text("no table")
     assert read_rows(tmp_path) == {}
+
+
+@pytest.mark.parametrize(
+    ("name", "edited"),
+    [("lit", "33.9%"), ("measured", "-inf"), ("measured_asked", "x"), ("exit", "one")],
+)
+def test_a_row_that_was_edited_is_no_row_and_the_others_are(tmp_path, name, edited):
+    good = [Row(part, part, 0, "met", lit="0.9") for part in ("a", "c")]
+    bad = replace(good[0], part="b", **{name: edited})
+    write_rows([*good, bad], tmp_path)
+    assert [*read_rows(tmp_path).values()] == good
+    write_index(read_rows(tmp_path).values(), tmp_path)
 
 
 def test_a_row_tells_how_many_are_needed_not_how_many_there_may_be(tmp_path, handmade):

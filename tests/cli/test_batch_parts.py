@@ -15,6 +15,7 @@ from planning.cli.batch import part_task, parts_bar, runners
 from planning.cli.batch.part_task import PartEnd, PartTask, plan_part
 from planning.cli.batch.parts import find_parts
 from planning.cli.batch.sent_files import rig_files
+from planning.cli.declared import plan_checks
 from planning.cli.main import commands
 from planning.model import installed
 from planning.model.document import made_with
@@ -93,7 +94,7 @@ AWKWARD = (
     "!!/??.obj",
     "!!.obj",
 )
-AWKWARD += (" -x.obj", "-y-/-.obj", "...obj", "....obj", "?/!/a.obj", "b/.../a.obj")
+AWKWARD += (" -x.obj", "-y-/-.obj", "?/!/a.obj", "b/.../a.obj")
 AWKWARD += (
     "batch.csv/a.obj",
     "index.html.obj",
@@ -116,6 +117,14 @@ def test_folders_are_below_the_output_whatever_parts_are_called(tmp_path):
     assert folders["テスト/部品.obj"] == "テスト/部品"
     assert folders["हिन्दी.obj"] == "हिन्दी"
     assert folders["!!/?!.obj"] == "part/part.obj"
+
+
+def test_what_macos_leaves_beside_meshes_is_no_part_and_no_member(tmp_path):
+    made(tmp_path, "a.obj", "._a.obj", "sub/b.stl", "sub/._b.stl.gz", ".c.zip")
+    assert [one.name for one in find_parts([str(tmp_path)])] == ["a.obj", "sub/b.stl"]
+    assert plan_checks._files(str(tmp_path)) == [str(tmp_path / "a.obj")]
+    # Who names one means it.
+    assert len(find_parts([str(tmp_path / "._a.obj")])) == 1
 
 
 def test_a_long_name_leaves_room_for_the_folder_beside_it(tmp_path):

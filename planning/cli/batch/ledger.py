@@ -8,6 +8,7 @@ import os
 from collections.abc import Generator, Iterable, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict, dataclass, fields, replace
+from math import isfinite
 from pathlib import Path
 from platform import machine
 
@@ -23,6 +24,7 @@ from .part_task import PartEnd, PartTask
 NAME = "batch.csv"
 # What tells which plan stands, and where.
 _OF_PLAN = ("folder", "asked", "digest", "files", "content")
+_SHARES = ("lit", "measured", "lit_asked", "measured_asked", "of_target")
 _VERDICTS = {0: "met", 1: "NOT MET", 130: "interrupted"}
 
 
@@ -200,16 +202,28 @@ def write_rows(rows: Iterable[Row], out: Path) -> None:
 
 
 def read_rows(out: Path) -> Mapping[str, Row]:
-    """Return the rows of an earlier run by part; none where there was none."""
+    """Return the rows of an earlier run by part, but for those that aren't any."""
     names = {field.name for field in fields(Row)}
     rows: dict[str, Row] = {}
-    with suppress(OSError, UnicodeDecodeError, csv.Error, ValueError):
+    with suppress(OSError, UnicodeDecodeError, csv.Error):
         text = (out / NAME).read_text("utf-8")
         for line in csv.DictReader(io.StringIO(text)):
             if set(line) == names and all(v is not None for v in line.values()):
-                row = Row(**{**line, "exit": int(line["exit"])})  # type: ignore[arg-type]
-                rows[row.part] = row
+                with suppress(ValueError):
+                    row = _row(line)
+                    rows[row.part] = row
     return rows
+
+
+def _row(line: Mapping[str, str]) -> Row:
+    """Return a line of the table.
+
+    Raises:
+        ValueError: If a share isn't a number, or the exit code none.
+    """
+    if not all(isfinite(float(line[name] or 0.0)) for name in _SHARES):
+        raise ValueError
+    return Row(**{**line, "exit": int(line["exit"])})  # type: ignore[arg-type]
 
 
 def is_whole(row: Row, out: Path) -> bool:
