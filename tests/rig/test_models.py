@@ -25,7 +25,7 @@ def mixed(*cameras: object, **tables: object):
 
 
 def required(rig, **asked):
-    wishes = Wishes(max_projectors=3, **asked)
+    wishes = Wishes(**{"max_projectors": 3} | asked)
     return rig.requirements(np.zeros(3), 0.1, wishes, tau_m=1.0)
 
 
@@ -68,6 +68,8 @@ def test_of_one_model_the_count_is_the_most_that_may_be_taken():
     assert required(rig).stock == ()
     lit = load_rig({"base": "default", "projector": {"count": 2}})
     assert required(lit).max_projectors == 2
+    alone = required(lit, pattern="none", max_projectors=0, views=2)
+    assert alone.max_projectors == 0
 
 
 def test_existing_devices_say_which_model_they_are():

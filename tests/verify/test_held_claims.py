@@ -359,6 +359,32 @@ def test_what_is_loosened_afterwards_is_named_with_its_pair(plan):
     assert "rig.check.max_rms_mm [m] is 0.0001" in failure
 
 
+@pytest.mark.parametrize(
+    ("asked", "there", "used", "whose"),
+    [
+        (None, 5, 5, ""),
+        (9, 5, 5, ""),
+        (4, 5, 4, ""),
+        (4, 5, 5, "request.max_cameras is 4"),
+        (9, 5, 9, "rig.camera.count is 5"),
+        (9, 5, 4, "rig.camera.count is 5"),
+        (None, 5, None, "rig.camera.count is 5"),
+        (None, None, 5, "request.max_cameras is None"),
+    ],
+)
+def test_as_many_are_allowed_as_were_asked_and_are_there(
+    plan, asked, there, used, whose
+):
+    def change(document):
+        document["request"]["max_cameras"] = asked
+        document["rig"]["camera"]["count"] = there
+        document["requirements"]["max_cameras"] = used
+
+    failures = found(forged(plan, change), again=None).failures
+    told = [line for line in failures if line.startswith("requirements.max_cameras")]
+    assert [line.rpartition("but ")[2] for line in told] == [whose] * bool(whose)
+
+
 def test_parts_derived_from_other_requirements_say_so(plan):
     document = plan.to_document()
     document["requirements"]["coverage"] = document["request"]["coverage"] = 0.5

@@ -77,7 +77,7 @@ def most_of(models: Sequence[Model], most: int | None) -> int | None:
     Of several models covers count each for itself.
     """
     count = models[0].table.count if len(models) == 1 else None
-    return most if count is None else min(count, most or count)
+    return min((n for n in (most, count) if n is not None), default=None)
 
 
 def _faults(

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+from planning.model.document.input_records import RigRecord
 from planning.model.document.request_records import RequestRecord, asked_digest
 from planning.model.plan import RigPlan
 
@@ -88,13 +89,29 @@ def _audit_at_a_step(
     if plan.document.rig.turntable is None or plan.document.stations is None:
         return
     steps = len(plan.document.stations.stations)
-    for name in ("max_projectors", "max_cameras"):
-        used, asked = getattr(plan.requirements, name), getattr(request, name)
+    for kind in ("projector", "camera"):
+        name = f"max_{kind}s"
+        used = getattr(plan.requirements, name)
+        whose, asked = _most(plan.document.rig, request, kind)
         findings.holds(
             asked is None or (used is not None and used <= steps * asked),
             name,
-            f"{used} is claimed of {steps} steps, but request.{name} is {asked}",
+            f"{used} is claimed of {steps} steps, but {whose} is {asked}",
         )
+
+
+def _most(rig: RigRecord, request: RequestRecord, kind: str) -> tuple[str, int | None]:
+    """Return how many devices are allowed, and whose number that is.
+
+    The fewer of what was asked and what the rig counts; of several models covers count
+    each for itself.
+    """
+    models, name = rig.models(kind), f"max_{kind}s"
+    asked = getattr(request, name)
+    count = models[0].count if len(models) == 1 else None
+    if count is None or (asked is not None and asked <= count):
+        return f"request.{name}", asked
+    return f"rig.{kind}.count", count
 
 
 def _of_request(plan: RigPlan, request: RequestRecord) -> Iterator[_Pair]:
@@ -103,8 +120,6 @@ def _of_request(plan: RigPlan, request: RequestRecord) -> Iterator[_Pair]:
     # Tighter ones are used where drawn rigs must meet what was asked.
     as_asked: Any = used.robust or used
     sources = {
-        "max_projectors": used,
-        "max_cameras": used,
         "target": used,
         "pattern": used,
         "min_reachable": used,
@@ -112,8 +127,11 @@ def _of_request(plan: RigPlan, request: RequestRecord) -> Iterator[_Pair]:
         "dominant_coverage": as_asked,
         "region_coverage": as_asked,
     }
-    if document.rig.turntable is not None:
-        del sources["max_projectors"], sources["max_cameras"]
+    if document.rig.turntable is None:
+        for kind in ("projector", "camera"):
+            key = f"max_{kind}s"
+            most = _most(document.rig, request, kind)
+            yield f"requirements.{key}", getattr(used, key), *most
     for name, source in sources.items():
         key = f"requirements.{name}"
         yield key, getattr(source, name), f"request.{name}", getattr(request, name)
