@@ -7,13 +7,17 @@ questions about their field, so that callers needn't ask which one they have.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from . import distortion as lens
 from .arrays import Array, Length, Mask, lengths
 
 _UNDISTORT_STEPS = 12
+# Of the fold.
+_WELL_BEFORE = 0.8
 _AHEAD = np.array([0.0, 0.0, 1.0])
 _AHEAD.flags.writeable = False
 
@@ -42,13 +46,22 @@ class PinholeModel:
     def project(self, points: Array) -> Array:
         """Return pixels (u, v) of points in the device frame; (..., 3) to (..., 2).
 
-        Points at or behind the optical centre give NaN.
+        Points at or behind the optical centre, or beyond the fold, give NaN.
         """
         z = points[..., 2]
         front = z > 0
         scale = np.divide(1.0, z, out=np.full_like(z, np.nan), where=front)
-        normalised = self._distort(points[..., :2] * scale[..., None])
+        normalised = points[..., :2] * scale[..., None]
+        if any(self.distortion):
+            beyond = lengths(normalised) >= self.fold
+            normalised = lens.distorted(normalised, self.distortion)
+            normalised[beyond] = np.nan
         return normalised * self._focal + self._principal
+
+    @cached_property
+    def fold(self) -> float:
+        """As of `distortion.fold`: no ray farther off the axis is in the image."""
+        return lens.fold(self.distortion)
 
     def contains(self, pixels: Array) -> Mask:
         """Return whether pixels (..., 2) lie inside the image; NaN doesn't."""
@@ -146,11 +159,13 @@ class PinholeModel:
         target = (np.asarray(pixels, dtype=np.float64) - self._principal) / self._focal
         normalised = target
         if any(self.distortion):
+            # From beyond the fold steps would lead away from the image.
+            far = np.maximum(lengths(target)[..., None], 1e-300)
+            normalised = target * np.minimum(1.0, _WELL_BEFORE * self.fold / far)
             for _ in range(_UNDISTORT_STEPS):
-                error = self._distort(normalised) - target
-                step = np.linalg.solve(
-                    self._distort_slope(normalised), error[..., None]
-                )
+                error = lens.distorted(normalised, self.distortion) - target
+                slope = lens.slope(normalised, self.distortion)
+                step = np.linalg.solve(slope, error[..., None])
                 normalised = normalised - step[..., 0]
         rays = np.concatenate(
             [normalised, np.ones((*normalised.shape[:-1], 1))], axis=-1
@@ -173,7 +188,7 @@ class PinholeModel:
         for i, j in np.ndindex(3, 2):
             dr_dp[:, i, j] = (float(i == j) - r[i] * r[j]) / norm
         if any(self.distortion):
-            dr_dp = dr_dp @ np.linalg.inv(self._distort_slope(p))
+            dr_dp = dr_dp @ np.linalg.inv(lens.slope(p, self.distortion))
         return dr_dp / self._focal
 
     @property
@@ -183,35 +198,6 @@ class PinholeModel:
     @property
     def _principal(self) -> Array:
         return self.camera_matrix[:2, 2]
-
-    def _distort(self, p: Array) -> Array:
-        if not any(self.distortion):
-            return p
-        k1, k2, p1, p2, k3 = self.distortion
-        x, y = p[..., 0], p[..., 1]
-        s = x * x + y * y
-        radial = 1.0 + s * (k1 + s * (k2 + s * k3))
-        return np.stack(
-            [
-                x * radial + 2.0 * p1 * x * y + p2 * (s + 2.0 * x * x),
-                y * radial + p1 * (s + 2.0 * y * y) + 2.0 * p2 * x * y,
-            ],
-            axis=-1,
-        )
-
-    def _distort_slope(self, p: Array) -> Array:
-        """Derivative dq/dp of the distortion, shape (..., 2, 2)."""
-        k1, k2, p1, p2, k3 = self.distortion
-        x, y = p[..., 0], p[..., 1]
-        s = x * x + y * y
-        radial = 1.0 + s * (k1 + s * (k2 + s * k3))
-        slope = 2.0 * (k1 + s * (2.0 * k2 + 3.0 * s * k3))
-        cross = x * y * slope + 2.0 * (p1 * x + p2 * y)
-        rows = [
-            [radial + x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x, cross],
-            [cross, radial + y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x],
-        ]
-        return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from geometry.devices import ParallelModel, PinholeModel
+from geometry.distortion import distorted, least_at, slope
 
 K = np.array([[1200.0, 0, 639.5], [0, 1180.0, 399.5], [0, 0, 1]])
 DISTORTION = (-0.21, 0.08, 0.0011, -0.0007, 0.013)
@@ -90,6 +91,48 @@ def test_points_at_or_behind_the_centre_have_no_pixel_and_are_not_contained() ->
     pixels = camera.project(np.array([[0.0, 0, -1], [0, 0, 0], [0.1, 0, np.nan]]))
     assert np.isnan(pixels).all()
     assert not camera.contains(pixels).any()
+
+
+@pytest.mark.parametrize(
+    ("terms", "fold"),
+    [
+        ((0.0,) * 5, np.inf),
+        ((0.2, 0.1, 0.0, 0.0, 0.0), np.inf),
+        ((-0.35, 0.0, 0.0, 0.0, 0.0), 1.05**-0.5),
+        ((0.0, -0.2, 0.0, 0.0, 0.0), 1.0),
+        ((0.0, 0.0, 0.0, 0.0, -1.0 / 7.0), 1.0),
+        ((0.0, 0.0, 0.03, -0.04, 0.0), 1.0 / 0.35),
+        # It folds, and would unfold again.
+        ((-2.0 / 3.0, 0.2, 0.0, 0.0, 0.0), 1.0),
+        ((-0.35, 0.13, 0.0, 0.0, -0.018), None),
+        (DISTORTION, None),
+    ],
+)
+def test_before_the_fold_each_ray_has_a_pixel_of_its_own(terms, fold) -> None:
+    camera = pinhole(terms)
+    if fold is not None:
+        assert camera.fold == pytest.approx(fold, rel=1e-6)
+    rng, far = np.random.default_rng(0), min(camera.fold, 4.0)
+    r, turn = far * np.sqrt(rng.uniform(size=2000)), rng.uniform(0, 2 * np.pi, 2000)
+    p = np.column_stack([r * np.cos(turn), r * np.sin(turn)])
+    assert np.linalg.eigvalsh(slope(p, terms)).min() > -1e-9
+    if np.isfinite(camera.fold):
+        aside = np.array([[1.001 * camera.fold, 0.0, 1.0], [0.0, 1e3, 1.0]])
+        assert np.isnan(camera.project(aside)).all()
+        assert not camera.in_field(aside).any()
+        ends = camera.fold * np.column_stack([np.cos(turn), np.sin(turn)])
+        least = np.hypot(*distorted(ends, terms).T).min()
+        assert least_at(camera.fold, terms) <= least + 1e-9
+
+
+def test_rays_are_found_though_pixels_lie_beyond_the_fold() -> None:
+    """Outwards first, then back: where the steps would begin is no ray of the image."""
+    matrix = np.array([[560.0, 0, 639.5], [0, 560.0, 511.5], [0, 0, 1]])
+    terms = (0.45, 0.091, -0.004, 0.002, -0.132)
+    camera = PinholeModel(matrix, (1280, 1024), (0.2, 2.0), terms)
+    assert np.hypot(*(camera.corners[0] - matrix[:2, 2]) / 560.0) > 1.1 * camera.fold
+    back = camera.project(camera.rays(camera.corners))
+    np.testing.assert_allclose(back, camera.corners, atol=1e-6)
 
 
 def test_the_image_reaches_half_a_pixel_beyond_the_outer_centres() -> None:

@@ -217,3 +217,31 @@ def test_distortion_of_a_projector_is_told_in_pixels_and_not_planned_with():
     r = math.sqrt(2.0) * 499.5 / 1000.0
     assert f"up to {0.01 * r**3 * 1000.0:.1f} px" in note
     assert not any("distortion" in note for note in load_rig().notes())
+
+
+@pytest.mark.parametrize("table", ["camera", "projector"])
+@pytest.mark.parametrize(
+    ("terms", "focal_px", "told"),
+    [
+        ([-0.35, 0, 0, 0, 0], 800.0, "44.3 degrees off the axis, 520 px .* 820 px"),
+        ([-3.0, 0, 0, 0, 0], 2000.0, "18.4 degrees"),
+        ([0, 0, 0.4, 0, 0], 800.0, "19.7 degrees"),
+        ([-0.662, -0.197, 0, 0, 0.393], 954.0, "or nearly so"),
+        # What calibrations come out as, of a wide and of narrow lenses.
+        ([-0.35, 0.13, 1e-3, -5e-4, -0.018], 800.0, None),
+        ([-0.28, 0.07, 2e-4, 1e-5, 0.0], 900.0, None),
+        ([0.1, -0.25, 1e-3, 1e-3, 0.1], 1000.0, None),
+        ([-0.35, 0, 0, 0, 0], 2400.0, None),
+    ],
+)
+def test_a_lens_that_folds_inside_its_image_is_refused(table, terms, focal_px, told):
+    lens = {"name": "l", "resolution_px": [1280, 1024], "focal_px": [focal_px] * 2}
+    lens |= {"range_mm": [300.0, 3000.0], "distortion": terms}
+    rig = {"base": "default", table: lens}
+    if told is None:
+        assert load_rig(rig).camera_device()
+        return
+    with pytest.raises(RigError, match=told) as refused:
+        load_rig(rig)
+    assert len(str(refused.value).splitlines()) == 1
+    assert f"[{table}] distortion = [" in str(refused.value)

@@ -7,14 +7,12 @@ from pydantic import model_validator
 
 from geometry.devices import ParallelModel, PinholeModel
 from planning.model.devices.bodies import Body
+from planning.model.devices.lens_fault import lens_fault
 from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.light.dense_code import DenseCode
 
 from .part import Interval, Matrix3, Part, Pose, Resolution, Vector3
 from .ring_records import RingSharesRecord, RingsRecord, are_radii
-
-# Of the pixel that a viewing ray was told of, where it is imaged.
-_SAME_PX = 1.0
 
 Limit = Literal[
     "standoff",
@@ -177,15 +175,8 @@ class CameraRecord(Part):
         device = PinholeModel(
             np.array(self.K), self.resolution, self.range_m, self.distortion
         )
-        if any(self.distortion):
-            width, height = self.resolution
-            ends = np.array([[x, y] for x in (0, width - 1) for y in (0, height - 1)])
-            off = np.abs(device.project(device.rays(ends)) - ends).max()
-            if not off <= _SAME_PX:
-                raise ValueError(
-                    f"{self.id}: distortion = {self.distortion} folds the image: its "
-                    f"corners see nothing"
-                )
+        if fault := lens_fault(device):
+            raise ValueError(f"{self.id}: {fault}")
         pose = np.array(self.world_from_device)
         existing = self.name if self.existing else ""
         return PlannedCamera(

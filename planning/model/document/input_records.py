@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from geometry.devices import ParallelModel, PinholeModel
 from planning.model.devices.bodies import Body
+from planning.model.devices.lens_fault import lens_fault
 
 from .head_records import CarrierRecord, HeadRecord, TurntableRecord
 from .part import Count, FileName, Interval, Matrix3, Part, Resolution, Size, Vector3
@@ -148,9 +149,12 @@ class ModelRecord(Part):
             lens[: len(bent)] = bent
             k1, k2, p1, p2, k3 = lens.tolist()
             matrix = np.array(self.K)
-            return PinholeModel(
+            device = PinholeModel(
                 matrix, self.resolution, self.range_m, (k1, k2, p1, p2, k3)
             )
+            if fault := lens_fault(device):
+                raise ValueError(f"{self.name}: {fault}")
+            return device
         if self.pixel_pitch_m is None:
             raise ValueError("neither K nor pixel_pitch_m: one says what it images")
         return ParallelModel(

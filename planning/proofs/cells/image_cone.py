@@ -8,9 +8,9 @@ by a little moves the pixel. With p = (x/z, y/z), rho = |p| and q(p) the distort
 so for v across the ray, |J_r^T v| >= |v| cos^2(off axis) / (max(fx, fy) |dq/dp|).
 
 With lens distortion, what counts as inside the image is every point that the lens model
-puts there, also such as it folds back into it from far outside. All of them have::
+puts there before it folds. All of them have::
 
-    rho |1 + k1 rho^2 + k2 rho^4 + k3 rho^6| - 3 (|p1| + |p2|) rho^2 <= R
+    rho (1 + k1 rho^2 + k2 rho^4 + k3 rho^6) - 3 (|p1| + |p2|) rho^2 <= R
 
 where R reaches the image's farthest corner, and up to the largest such rho::
 
@@ -27,7 +27,6 @@ from geometry.devices import PinholeModel
 _ROUNDING = 1e-9
 # Roots of the polynomials are exact to this, with much to spare.
 _ROOTS = 1e-5
-_QUARTER = float(np.pi / 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,8 +78,6 @@ def _distorted_cone(device: PinholeModel) -> ImageCone:
     reach = float(np.hypot(*np.abs(device.sides()).max(axis=0)))
     rho = _farthest(device, reach)
     axis = np.array([0.0, 0.0, 1.0])
-    if not np.isfinite(rho):
-        return ImageCone(axis, _QUARTER, _QUARTER, 0.0)
     k1, k2, p1, p2, k3 = np.abs(device.distortion)
     s = rho * rho
     stretch = 1.0 + s * (3.0 * k1 + s * (5.0 * k2 + s * 7.0 * k3))
@@ -90,15 +87,13 @@ def _distorted_cone(device: PinholeModel) -> ImageCone:
 
 
 def _farthest(device: PinholeModel, reach: float) -> float:
-    """Return the largest rho that the lens model may put into the image, or inf."""
+    """Return the largest rho that the lens model may put into the image."""
     k1, k2, p1, p2, k3 = device.distortion
     aside = 3.0 * (abs(p1) + abs(p2))
-    radial = np.array([k3, 0.0, k2, 0.0, k1, 0.0, 1.0, 0.0])
-    bend = np.array([0.0, 0.0, 0.0, 0.0, 0.0, aside, 0.0, reach])
-    # Beyond the largest root of both, either sign of the radial part is too large.
-    roots = np.concatenate([np.roots(radial - bend), np.roots(-radial - bend)])
+    beyond_reach = np.array([k3, 0.0, k2, 0.0, k1, -aside, 1.0, -reach])
+    roots = np.roots(beyond_reach)
     real = roots.real[np.abs(roots.imag) <= _ROOTS * (1.0 + np.abs(roots))]
     rho = float(real.max(initial=reach)) * (1.0 + _ROOTS) + _ROOTS
-    beyond = 2.0 * rho + 1.0
-    over = abs(np.polyval(radial, beyond)) - np.polyval(bend, beyond)
-    return rho if over > 0.0 else float("inf")
+    # From the largest root on all are beyond, or none.
+    leaves = np.polyval(beyond_reach, 2.0 * rho + 1.0) > 0.0
+    return min(rho, device.fold) if leaves else device.fold

@@ -9,6 +9,7 @@ import numpy as np
 
 from geometry.devices import DeviceModel, ParallelModel, PinholeModel
 from planning.model.devices.bodies import Body
+from planning.model.devices.lens_fault import lens_fault
 from planning.model.errors import RigError
 from planning.model.light.drawn_edges import DrawnEdges
 from planning.model.light.light_budget import LightBudget
@@ -31,7 +32,8 @@ def pinhole_device(table: PinholeTable, role: str) -> PinholeModel:
     A projector's lens is taken as straight: rings are drawn as if it were.
 
     Raises:
-        RigError: If no distance is sharp, or sharpness has no far end.
+        RigError: If no distance is sharp, or sharpness has no far end, or its lens
+            model folds the image.
     """
     width, height = table.resolution_px
     fx, fy = _focal_px(table)
@@ -40,8 +42,7 @@ def pinhole_device(table: PinholeTable, role: str) -> PinholeModel:
     else:
         cx = 0.5 * (width - 1)
         cy = optics.principal_row(height, table.vertical_offset_percent or 0.0)
-    straight = isinstance(table, ProjectorTable)
-    k1, k2, p1, p2, k3 = [0.0] * 5 if straight else table.distortion
+    k1, k2, p1, p2, k3 = table.distortion
     camera_matrix = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
     camera_matrix.setflags(write=False)
     off = math.atan(
@@ -55,12 +56,16 @@ def pinhole_device(table: PinholeTable, role: str) -> PinholeModel:
             f"{math.degrees(_FARTHEST_OFF):.0f}, correct principal_point_px or "
             f"vertical_offset_percent"
         )
-    return PinholeModel(
+    device = PinholeModel(
         camera_matrix,
         (width, height),
         _sharp_range(table, math.sqrt(fx * fy), role),
         (k1, k2, p1, p2, k3),
     )
+    if fault := lens_fault(device):
+        raise RigError(f"[{role}] {fault}")
+    straight = isinstance(table, ProjectorTable)
+    return replace(device, distortion=(0.0,) * 5) if straight else device
 
 
 def parallel_device(table: ParallelTable) -> ParallelModel:
@@ -208,7 +213,7 @@ def _bent_px(table: ProjectorTable, role: str) -> float:
     width, height = device.resolution
     corners = np.array([[x, y] for x in (0, width - 1) for y in (0, height - 1)])
     bent = replace(device, distortion=(k1, k2, p1, p2, k3))
-    moved = bent.project(device.rays(corners.astype(np.float64))) - corners
+    moved = device.project(bent.rays(corners.astype(np.float64))) - corners
     return float(np.linalg.norm(moved, axis=1).max())
 
 

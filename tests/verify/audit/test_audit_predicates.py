@@ -15,7 +15,7 @@ from planning.model.requirements import ProjectorLimits
 from planning.verify.audit.audit_samples import AuditSamples, draw_samples
 from planning.verify.audit.baselines.audit_seams import are_normals, faces_reach
 from planning.verify.audit.predicates.audit_devices import AuditProjector, light_from
-from planning.verify.audit.predicates.audit_optics import pixel_gradient
+from planning.verify.audit.predicates.audit_optics import in_image, pixel_gradient
 from planning.verify.audit.predicates.occlusion import Shadow
 from planning.verify.audit.predicates.predicates import (
     LIGHT_CAUSES,
@@ -288,3 +288,26 @@ def test_normals_at_a_seam_point_are_those_of_faces_beside_it():
     assert beside(0.0, -1.0, 0.0)
     for other in np.vstack([np.eye(3)[1:], -np.eye(3)[::2]]):
         assert not beside(*other)
+
+
+@pytest.mark.parametrize(
+    "terms",
+    [
+        (-0.35, 0.0, 0.0, 0.0, 0.0),
+        (-0.3, 0.05, 0.002, -0.004, 0.0),
+        (0.2, 0.0, 0.001, 0.0, -0.05),
+        (0.1, 0.05, 0.0, 0.0, 0.0),
+    ],
+)
+def test_rays_beyond_a_fold_are_in_no_image(terms):
+    """As the planner has it, which puts some of them back into the image otherwise."""
+    matrix = np.array([[1800.0, 0.0, 639.5], [0.0, 1800.0, 511.5], [0.0, 0.0, 1.0]])
+    device = PinholeModel(matrix, (1280, 1024), (0.1, 9.0), terms)
+    off = np.linspace(-1.5, 1.5, 4001)
+    for turn in np.linspace(0.0, 3.0, 7):
+        aside = np.outer(np.tan(off), [math.cos(turn), math.sin(turn)])
+        local = np.column_stack([aside, np.ones(len(off))])
+        inside = in_image(device, local)
+        assert np.array_equal(inside, device.in_field(local))
+        assert np.abs(np.flatnonzero(np.diff(inside)) - 2000).max() < 1000
+        assert len(np.flatnonzero(np.diff(inside))) == 2

@@ -11,7 +11,7 @@ from geometry.arrays import Array, Mask
 from geometry.mesh.mesh import TriangleMesh
 from planning.model.devices.planned import PlannedCamera
 from planning.model.document.device_records import BaselineRow
-from planning.verify.audit.predicates.audit_optics import dot, in_image, pixels_of
+from planning.verify.audit.predicates.audit_optics import dot, in_image
 
 _STEPS = 2000
 # How near E a face must lie to lend its normal, as a share of the object's radius.
@@ -168,12 +168,7 @@ def _room(camera: PlannedCamera, to_centre: Array, pole: Array) -> float:
 def _inside(camera: PlannedCamera, frame: Array, turns: Array) -> Mask:
     """Whether a camera has rays in its image, turned in a frame: E's ray and aside."""
     rays = np.cos(turns)[:, None] * frame[0] + np.sin(turns)[:, None] * frame[1]
-    local = rays @ camera.world_from_device[:3, :3]
-    ahead = local[:, 2] > 1e-9
-    inside = np.zeros(len(turns), dtype=bool)
-    device = camera.device
-    inside[ahead] = in_image(device.resolution, pixels_of(device, local[ahead]))
-    return inside
+    return in_image(camera.device, rays @ camera.world_from_device[:3, :3])
 
 
 def faces_reach(mesh: TriangleMesh) -> Array:

@@ -20,7 +20,6 @@ from .audit_optics import (
     in_world,
     lens_shifts,
     pixel_gradient,
-    pixels_of,
     towards,
 )
 from .occlusion import Block, bodies_but
@@ -56,12 +55,7 @@ class DivergingRays:
 
     def leaves(self, points: Array) -> Mask:
         """Return whether light towards points leaves the device, shape (n,)."""
-        local = in_frame(self.pose, points)
-        ahead = np.flatnonzero(local[:, 2] > 0)
-        inside = np.zeros(len(points), dtype=bool)
-        pixels = pixels_of(self.device, local[ahead])
-        inside[ahead] = in_image(self.device.resolution, pixels)
-        return inside
+        return in_image(self.device, in_frame(self.pose, points))
 
     def coordinate(self, ring: Array) -> Array:
         """Return c of points in ring coordinates, (n, 3) to (n,); inf behind."""

@@ -4,6 +4,8 @@ Where the planner differentiates by hand, this module differentiates its own pro
 numerically: an error of sign or of order shows as a difference of areas.
 """
 
+from functools import cache
+
 import numpy as np
 
 from geometry.arrays import Array, Mask, cross, lengths
@@ -11,6 +13,7 @@ from geometry.devices import PinholeModel
 
 _STEP = 1e-5
 _INVERSIONS = 30
+_ANGLES = 90_001
 
 
 def dot(a: Array, b: Array) -> Array:
@@ -68,11 +71,35 @@ def rays_of(device: PinholeModel, pixels: Array) -> Array:
     return local / lengths(local)[:, None]
 
 
-def in_image(resolution: tuple[int, int], pixels: Array) -> Mask:
-    """Return whether pixels (n, 2) lie inside the image; pixel centres are integers."""
-    width, height = resolution
-    u, v = pixels[:, 0], pixels[:, 1]
-    return (u >= -0.5) & (u <= width - 0.5) & (v >= -0.5) & (v <= height - 0.5)
+def in_image(device: PinholeModel, local: Array) -> Mask:
+    """Return whether points (n, 3) appear in a device's image, shape (n,).
+
+    In front of it, before its lens folds; pixel centres are integers.
+    """
+    ahead = local[:, 2] > 0
+    some, (width, height) = local[ahead], device.resolution
+    u, v = pixels_of(device, some).T
+    inside = (u >= -0.5) & (u <= width - 0.5) & (v >= -0.5) & (v <= height - 0.5)
+    if any(device.distortion):
+        off_axis = np.arctan2(np.hypot(some[:, 0], some[:, 1]), some[:, 2])
+        inside &= off_axis < _fold(tuple(device.distortion))
+    ahead[ahead] = inside
+    return ahead
+
+
+@cache
+def _fold(distortion: tuple[float, ...]) -> float:
+    """Angle to the axis from which on a lens model folds the image [rad].
+
+    To a thousandth of a degree: where the pixel of a ray that is turned outwards first
+    stops to move outwards, at the least whichever way it is turned.
+    """
+    k1, k2, p1, p2, k3 = distortion
+    angles = np.linspace(0.0, 0.5 * np.pi, _ANGLES, endpoint=False)
+    r = np.tan(angles)
+    outwards = 1 + 3 * k1 * r**2 + 5 * k2 * r**4 + 7 * k3 * r**6
+    folds = outwards <= 7 * np.hypot(p1, p2) * r
+    return float(angles[np.argmax(folds)]) if folds.any() else float(np.pi / 2)
 
 
 def pixel_gradient(device: PinholeModel, local: Array, across: Array) -> Array:

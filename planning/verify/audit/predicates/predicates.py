@@ -16,7 +16,7 @@ from planning.model.requirements import (
 from planning.verify.audit.audit_samples import AuditSamples
 
 from .audit_devices import AuditCamera, AuditProjector
-from .audit_optics import dot, in_frame, in_image, pixels_of, towards
+from .audit_optics import dot, in_frame, in_image, towards
 from .error_terms import NOISE_TERMS, PairGeometry, deviation, error_terms
 from .occlusion import Shadow, free_of
 
@@ -97,15 +97,11 @@ def sight_steps(
 ) -> Steps:
     """Return how many limits of *seen* each sample passes, shape (n,); `SEEN`: seen."""
     local = in_frame(camera.world_from_device, samples.points)
-    ahead = np.flatnonzero(local[:, 2] > 0)
-    in_field = np.zeros(len(samples), dtype=bool)
-    pixels = pixels_of(camera.device, local[ahead])
-    in_field[ahead] = in_image(camera.device.resolution, pixels)
     along, length = towards(samples.points, camera.world_from_device[:3, 3])
     near, far = camera.device.range_m
     squarely = -dot(samples.normals, along)
     steps = _passed(
-        in_field,
+        in_image(camera.device, local),
         (length >= near) & (length <= far),
         squarely >= np.cos(limits.max_incidence),
     )
