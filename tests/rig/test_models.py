@@ -131,6 +131,33 @@ def test_projectors_of_a_list_are_focused_alike():
         load_rig({"base": "default", "projector": [first, other]})
 
 
+@pytest.mark.parametrize(
+    ("wider", "farther", "told"),
+    [
+        (1.0, 1.0, ""),
+        (1.004, 0.996, ""),
+        (0.994, 1.0, "through a pupil of 9.161 mm.*first .* of 9.216"),
+        (1.0, 1.006, "1006 mm through .* first is focused at 1000 mm"),
+    ],
+)
+def test_pupils_that_rounded_numbers_give_are_alike(wider, farther, told):
+    """No f-number of a few digits gives two lenses the same to the last digit."""
+    first = {"name": "a", "resolution_px": [1920, 1080], "throw_ratio": 1.5}
+    first |= {"pixel_um": 8.0, "focus": {"distance_mm": 1000.0, "f_number": 2.5}}
+    first["focus"]["blur_px"] = 5.0
+    other = first | {"name": "b", "throw_ratio": 0.8}
+    number = 2.5 * 0.8 / 1.5 / wider
+    focus = {"distance_mm": 1000.0 * farther, "f_number": number, "blur_px": 5.0}
+    rig = {"base": "default", "projector": [first, other | {"focus": focus}]}
+    if not told:
+        assert len(load_rig(rig).models("projector")) == 2
+        return
+    with pytest.raises(RigError, match=told) as refused:
+        load_rig(rig)
+    pupils = [part.split()[0] for part in str(refused.value).split("a pupil of ")[1:]]
+    assert len(set(pupils)) == (1 if wider == 1.0 else 2)
+
+
 def test_a_model_that_isnt_sharp_is_named():
     far = WIDE | {"range_mm": [2000.0, 3000.0]}
     with pytest.raises(InfeasibleLimitsError, match="which camera 2 is sharp"):

@@ -1,5 +1,6 @@
 """The models of a kind of device: one, or a list of which a stock holds so many."""
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -12,6 +13,9 @@ from planning.model.requirements import Stock
 from planning.rig.rig_tables import ParallelTable, PinholeTable, RigTable
 
 from .rig_devices import device_of, drawn_edges
+
+# Relative: makers' f-numbers have two or three digits.
+_ALIKE = 5e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,13 +102,21 @@ def _faults(
         )
     first, *others = (drawn_edges(t, d) for t, d in zip(tables, devices, strict=True))
     for place, other in enumerate(others, 2):
-        if key == "projector" and other != first:
+        if key == "projector" and not _focused_alike(first, other):
             yield (
                 f"[[projector]] {place} is {_focused(other)}, the first is "
                 f"{_focused(first)}; the blur of drawn edges is one for all: write a "
-                f"distance_mm and an f_number that give the same, or range_mm and no "
-                f"[projector.focus] for each"
+                f"distance_mm and an f_number that give the same to "
+                f"{100.0 * _ALIKE:g} %, or range_mm and no [projector.focus] for each"
             )
+
+
+def _focused_alike(first: DrawnEdges, other: DrawnEdges) -> bool:
+    if first.focus_m is None or other.focus_m is None:
+        return first == other
+    return math.isclose(first.focus_m, other.focus_m, rel_tol=_ALIKE) and math.isclose(
+        first.aperture_m, other.aperture_m, rel_tol=_ALIKE
+    )
 
 
 def _focused(drawn: DrawnEdges) -> str:
