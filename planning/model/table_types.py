@@ -125,7 +125,14 @@ def read_pose(rows: list[list[float]], key: str) -> Array:
     pose = np.array(rows)
     turn = pose[:3, :3]
     off = float(np.abs(turn @ turn.T - np.eye(3)).max())
-    if not (off <= _ROTATION and np.linalg.det(turn) > 0.0):
+    mirrored = float(np.linalg.det(turn))
+    if mirrored < -0.5:
+        raise ValueError(
+            f"{key}: its first three columns are mirrored (determinant {mirrored:.3g}, "
+            f"of a rotation 1): the axes of a device are x right, y down, z forward; "
+            f"turn the axis that is the wrong way round"
+        )
+    if not off <= _ROTATION:
         raise ValueError(
             f"{key}: its first three columns must be a rotation (R R^T differs "
             f"from the identity by {off:.2g}); write more digits"

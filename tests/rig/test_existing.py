@@ -88,7 +88,7 @@ def test_aim_and_pose_are_where_the_file_says(required_of):
         (OLD + OLD, "existing names 'old projector' twice"),
         (POSED + "roll_deg = 3\n", "has pose_mm beside"),
         (POSED.replace("[1, 0,", "[1.01, 0,"), "must be a rotation.*0.02"),
-        (POSED.replace("[1, 0,", "[-1, 0,"), "must be a rotation"),
+        (POSED.replace("[1, 0,", "[-1, 0,"), r"mirrored \(determinant -1, .*; turn"),
         (POSED.replace("[0, 0, 0, 1]", "[0, 0, 0, 2]"), "last row .* must be 0 0 0 1"),
     ],
 )
