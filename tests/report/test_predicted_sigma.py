@@ -176,6 +176,30 @@ def test_noise_and_calibration_are_told_apart(plan):
     assert line.endswith("(limit 0.3); the rig states no [calibration]")
 
 
+@pytest.mark.parametrize(
+    ("code", "lit", "words"),
+    [
+        ({"phase_noise": np.radians(1.5)}, False, ", 1.5 degrees of phase noise and"),
+        ({}, True, ", that of the phase by the light and"),
+        ({"shifts": 0}, False, ", codes told to a pixel and"),
+    ],
+)
+def test_the_noise_of_coded_pixels_is_told_with_that_of_the_phase(
+    plan, code, lit, words
+):
+    """It is the largest term."""
+
+    def coded(document):
+        for record in document["projectors"]:
+            record |= {"ring_radii": [], "rings": None, "ring_shares": None}
+            record["code"] = {"shifts": 4, "period_px": 16, "phase_noise": 0.02} | code
+        if not lit:
+            document["requirements"]["triangulation"]["light"] = None
+
+    alone = next(x for x in coverage_lines(tampered(plan, coded)) if "median" in x)
+    assert f"px edge noise{words} the panel's pixels alone" in alone
+
+
 @pytest.mark.parametrize("name", ["focus_m", "aperture_m"])
 def test_another_focus_than_the_rigs_is_found(plan, case, name):
     def change(document):

@@ -91,13 +91,7 @@ def _sigma_lines(plan: RigPlan) -> list[str]:
     limit = limits.max_sigma_m
     at_most = "" if limit is None else f" (limit {1e3 * limit:g})"
     whole = share(sigma.median_m, sigma.p95_m)
-    light = "" if limits.light is None else ", that of the light"
-    panel = "" if limits.drawn_edges is None else " and the panel's pixels"
-    edges = (
-        f"predicted sigma along the normal, of {limits.noise_px:g} px "
-        f"{'noise of matches' if plan.cameras_alone else 'edge noise'}"
-        f"{light}{panel} alone"
-    )
+    edges = f"predicted sigma along the normal, of {_noise_words(plan)} alone"
     if limits.calibration is None:
         return [f"{edges}: {whole}{at_most}; the rig states no [calibration]"]
     noise = share(sigma.noise_median_m or 0.0, sigma.noise_p95_m or 0.0)
@@ -109,6 +103,26 @@ def _sigma_lines(plan: RigPlan) -> list[str]:
         f"with what the calibration leaves ({_left_words(limits.calibration)}): "
         f"{whole}{of_all}; rms by term {terms} mm",
     ]
+
+
+def _noise_words(plan: RigPlan) -> str:
+    """Say what noise there is but for the calibration's part, in each pattern."""
+    limits = plan.requirements.triangulation
+    noise = "noise of matches" if plan.cameras_alone else "edge noise"
+    parts = [f"{limits.noise_px:g} px {noise}"]
+    codes = [p.code for p in plan.projectors if p.code is not None]
+    if not codes and limits.light is not None:
+        parts.append("that of the light")
+    if codes and not codes[0].shifts:
+        parts.append("codes told to a pixel")
+    elif codes and limits.light is not None:
+        parts.append("that of the phase by the light")
+    elif codes:
+        parts.append(f"{math.degrees(codes[0].phase_noise):.3g} degrees of phase noise")
+    if limits.drawn_edges is not None:
+        parts.append("the panel's pixels")
+    *first, last = parts
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def _left_words(errors: CalibrationErrors) -> str:
