@@ -1,6 +1,7 @@
 """What a run prints: the verdict first, and no more than a person reads."""
 
 import io
+import re
 
 import pytest
 from rich.console import Console
@@ -74,6 +75,28 @@ def test_what_is_missed_is_told_with_what_was_asked_and_what_helps(plan):
     assert light.figure in text
     assert f"HELPS {light.helps[0].split(' (')[0]}" in text
     assert str(light) == shortfalls(one)[0]
+
+
+def test_a_field_that_is_far_too_wide_is_told_to_the_end(plan):
+    def tiny(document):
+        document["rig"] |= {"standoff_m": 50.0, "name": "of a long name " * 9}
+
+    text = " ".join(brief(changed(plan, tiny), FILES, ()).split())
+    assert re.search(r"WARNING the object is .* mm, is its unit right\?", text)
+
+
+@pytest.mark.parametrize("views", [1, 2])
+def test_what_is_asked_of_two_pairs_is_told_of_two(plan, views):
+    def counted(document):
+        document["requirements"]["survival"] = {"views": views, "survive": 0}
+        areas = {"lit_m2": 1.0, "reachable_by_projectors_m2": 1.0, "measured_m2": 0.5}
+        loss = areas | {"lost": None, "reachable_by_cameras_m2": 1.0}
+        count = {"count": 2, "needed": 2, "without": 1, "lower_bound": 2}
+        counts = {"projectors": count, "cameras": count}
+        document["survival"] = {"samples": 9, "losses": [loss]} | counts
+
+    text = " ".join(brief(changed(plan, counted), FILES, ()).split())
+    assert ("% by one pair, 50.0 % by 2 pairs (" in text) == (views == 2)
 
 
 def test_devices_beyond_the_room_are_counted(plan):

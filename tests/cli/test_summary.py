@@ -101,7 +101,7 @@ def test_the_first_line_warns_of_an_object_lost_in_the_field(handmade, share, wa
     rig = plan.document.rig.changed(standoff_m=across / share / field_at_1_m)
     told = summary(RigPlan(plan.document.changed(rig=rig), plan.surface), [], [])
     first, *others = told.splitlines()
-    words = f"WARNING: it is {1e3 * across:.3g} mm across in a camera's field"
+    words = f"WARNING: the object is {1e3 * across:.3g} mm across in a camera's field"
     assert (words in first) == warned
     assert not any(words in line for line in others)
 

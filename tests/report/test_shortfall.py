@@ -20,7 +20,7 @@ def plan(handmade):
     return handmade.build_plan()
 
 
-def missed(plan, *, blocked=None, relaxations=(), **areas):
+def missed(plan, *, blocked=None, relaxations=(), pattern="rings", **areas):
     document = plan.to_document()
     document["coverage"]["relaxations"] = list(relaxations)
     if blocked is not None:
@@ -51,7 +51,10 @@ def missed(plan, *, blocked=None, relaxations=(), **areas):
         "coverage": 0.95,
         "dominant_coverage": 0.9,
         "min_reachable": 0.9,
+        "pattern": pattern,
     }
+    if pattern == "none":
+        document["certificates"]["projectors"] = None
     return shortfalls(RigPlan.from_document(document, plan.surface))
 
 
@@ -88,6 +91,20 @@ def test_cameras_that_miss_by_a_hair_offer_the_share_they_reach(plan):
     assert line.startswith("3 cameras measure 93.9 %")
     assert "--coverage 0.93 accepts this plan" in line
     assert "--max-cameras" not in line
+
+
+def test_what_accepts_a_plan_that_misses_several_is_told_together(plan):
+    """Each alone would leave the other missed."""
+    told = missed(plan, lit_m2=0.4, measured_m2=0.939)
+    together = "--dominant-coverage 0.40 --coverage 0.93 together accept this plan"
+    assert len(told) == 2
+    assert all(line.endswith(together) for line in told)
+
+
+def test_without_light_nothing_is_said_to_be_lit(plan):
+    (line,) = missed(plan, pattern="none", measured_m2=0.5)
+    assert "measure 50.0 % of what is measurable, " in line
+    assert "lit" not in line.replace("--", "")
 
 
 @pytest.mark.parametrize(

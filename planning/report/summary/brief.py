@@ -14,7 +14,7 @@ from planning.model.plan import RigPlan
 from planning.model.words import count_words, percent
 from planning.report.tolerance.joint_lines import joint_words
 from planning.report.tolerance.robust_lines import robust_cost
-from planning.report.tolerance.survival_lines import losses_words
+from planning.report.tolerance.survival_lines import by_several_pairs, losses_words
 
 from .cause_words import causes_line
 from .check_lines import error_words, missing_words, unchecked
@@ -95,9 +95,11 @@ def _head(plan: RigPlan, short: Sequence[Shortfall]) -> Iterator[Block]:
     yield (
         "",
         f"{x:.0f} x {y:.0f} x {z:.0f} mm, up {up}, rig {rig.name}; target: "
-        f"{target_words(plan)}{lost_in_field(plan)}",
+        f"{target_words(plan)}",
         2,
     )
+    if lost := lost_in_field(plan):
+        yield "WARNING", lost, 2
     for line in warnings(plan)[:2]:
         yield "WARNING", line, 1
     if document.assumed:
@@ -148,6 +150,8 @@ def _measured(plan: RigPlan) -> Iterator[Block]:
         areas.lit_m2, areas.reachable_by_projectors_m2, asked.dominant_coverage
     )
     seen = _share(areas.measured_m2, areas.reachable_by_cameras_m2, asked.coverage)
+    if several := by_several_pairs(plan):
+        seen = f"{seen} by one pair, {several}"
     first = f"lit {lit} ({100 * asked.dominant_coverage:g} asked) and measured"
     if plan.cameras_alone:
         first = f"by pairs, {asked.min_views} cameras or more seeing it, measured"

@@ -4,6 +4,7 @@ import math
 
 from planning.model.document.plan_document import PlanDocument
 from planning.model.words import area_words, percent
+from planning.scene.limits.limit import causes
 from planning.scene.limits.pair_limits import MEASURED_LIMITS
 from planning.scene.limits.projector_limits import PROJECTOR_LIMITS
 from planning.scene.limits.view_pair_limits import VIEW_PAIR_LIMITS
@@ -34,6 +35,20 @@ def areas_line(areas: dict[str, float]) -> str:
     return "; ".join(
         f"{area_words(area)} {_CAUSE_WORDS.get(c, c)}" for c, area in phrases
     )
+
+
+def causes_left(kind: str, document: PlanDocument) -> str:
+    """Say what keeps `projectors` or `cameras` from the target, as a sentence."""
+    limits, lit = PROJECTOR_LIMITS, ""
+    if kind == "cameras":
+        limits = (*MEASURED_LIMITS, *VIEW_PAIR_LIMITS)
+        lit = "" if document.requirements.pattern == "none" else "lit "
+    areas = {
+        cause: area
+        for cause, area in document.coverage.uncovered_by_cause.items()
+        if cause in causes(limits)
+    }
+    return f" Of the {lit}target: {areas_line(areas)}." if areas else ""
 
 
 def rounded_down(share: float) -> str:

@@ -1,5 +1,6 @@
 """Which requirements a plan misses, why, and what would help."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -15,13 +16,10 @@ from planning.report.tolerance.survival_lines import (
     measured_words,
     pairs_words,
 )
-from planning.scene.limits.limit import causes
-from planning.scene.limits.pair_limits import MEASURED_LIMITS
-from planning.scene.limits.projector_limits import PROJECTOR_LIMITS
-from planning.scene.limits.view_pair_limits import VIEW_PAIR_LIMITS
 
 from .cause_words import (
     areas_line,
+    causes_left,
     causes_line,
     inside_words,
     leaving_out_inside,
@@ -30,8 +28,8 @@ from .cause_words import (
 from .devices.device_lines import used_up
 from .region_lines import floor_shortfalls
 
-# What accepts the one requirement that a plan misses.
-_ACCEPTS = " accepts this plan"
+# The option that accepts one requirement that a plan misses.
+_ACCEPTS = re.compile(r"(--\S+ [\d.]+) accepts (?:this plan|what there is)$")
 
 
 @dataclass(frozen=True)
@@ -71,11 +69,24 @@ def missing(plan: RigPlan) -> Iterator[Shortfall]:
     if plan.members:
         return
     every = list(_missing(plan))
+    together = _accepting_all(every)
     for one in every:
         # Where several are missed, what accepts one doesn't accept the plan.
-        told = _ACCEPTS if len(every) == 1 else " asks for no more"
-        helps = (text.replace(_ACCEPTS, told) for text in one.helps)
+        helps = (_ACCEPTS.sub(together, text) for text in one.helps)
         yield replace(one, helps=tuple(helps))
+
+
+def _accepting_all(every: list[Shortfall]) -> str:
+    """Return what stands for an option that accepts one shortfall, as a pattern.
+
+    All such options, if each shortfall has one.
+    """
+    found = [[m[1] for m in map(_ACCEPTS.search, one.helps) if m] for one in every]
+    options = list(dict.fromkeys(option for some in found for option in some))
+    if len(every) == 1 or not all(found):
+        return r"\g<0>" if len(every) == 1 else r"\1 asks for no more"
+    together = "accepts" if len(options) == 1 else "together accept"
+    return f"{' '.join(options)} {together} this plan"
 
 
 def _missing(plan: RigPlan) -> Iterator[Shortfall]:
@@ -214,6 +225,7 @@ def _unmeasurable(document: PlanDocument) -> str:
 
 def _covered(document: PlanDocument, requirements: Requirements) -> Iterator[Shortfall]:
     areas, proofs = document.coverage.target, document.certificates
+    lit = "" if requirements.pattern == "none" else "lit and "
     for kind, proof, covered, whole, required, (deed, done) in (
         (
             "projectors",
@@ -229,7 +241,7 @@ def _covered(document: PlanDocument, requirements: Requirements) -> Iterator[Sho
             areas.measured_m2,
             areas.reachable_by_cameras_m2,
             requirements.coverage,
-            ("measure {} of what is lit and measurable", "measured"),
+            (f"measure {{}} of what is {lit}measurable", "measured"),
         ),
     ):
         share = covered / whole if whole > 0 else 0.0
@@ -243,25 +255,9 @@ def _covered(document: PlanDocument, requirements: Requirements) -> Iterator[Sho
             f"{proof.count} {devices} {verb.format(told)}, "
             f"{percent(required)} is required; {area_words(whole - covered)} of "
             f"{area_words(whole)} are left{_bodies(document.coverage, proof)}."
-            f"{_why(kind, document.coverage)}",
+            f"{causes_left(kind, document)}",
             _remedies(kind, document, share),
         )
-
-
-def _why(kind: str, coverage: Coverage) -> str:
-    """What keeps devices of a kind from the target, with areas, as a sentence."""
-    limits = PROJECTOR_LIMITS
-    if kind == "cameras":
-        limits = (*MEASURED_LIMITS, *VIEW_PAIR_LIMITS)
-    areas = {
-        cause: area
-        for cause, area in coverage.uncovered_by_cause.items()
-        if cause in causes(limits)
-    }
-    if not areas:
-        return ""
-    of = "target" if kind == "projectors" else "lit target"
-    return f" Of the {of}: {areas_line(areas)}."
 
 
 def _bodies(coverage: Coverage, proof: Certificate) -> str:

@@ -72,7 +72,8 @@ def _head(plan: RigPlan) -> str:
     size = np.diff(plan.surface.mesh.bounds, axis=0)[0] * 1e3
     cut = "; TRUNCATED" if document.truncated else ""
     cut += f"; {unchecked(plan)}" if document.reconstruction is None else ""
-    cut += lost_in_field(plan)
+    lost = lost_in_field(plan)
+    cut += f"; WARNING: {lost}" if lost else ""
     words = body_words(plan.surface.mesh)
     bodies = f"         {words}\n" if words else ""
     return (
@@ -104,7 +105,7 @@ def lost_in_field(plan: RigPlan) -> str:
     if not across < _TINY * field:
         return ""
     return (
-        f"; WARNING: it is {1e3 * across:.3g} mm across in a camera's field of "
+        f"the object is {1e3 * across:.3g} mm across in a camera's field of "
         f"{1e3 * field:.0f} mm, is its unit right?"
     )
 

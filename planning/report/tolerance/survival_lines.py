@@ -66,6 +66,16 @@ def losses_words(plan: RigPlan) -> tuple[str, str] | None:
     return label, "; ".join(filter(None, parts))
 
 
+def by_several_pairs(plan: RigPlan) -> str:
+    """Return the share that as many pairs measure as are asked for, where several."""
+    record, asked = plan.document.survival, plan.requirements.survival
+    if record is None or asked is None or asked.views == 1:
+        return ""
+    share = next(measured_share(loss) for loss in record.losses if not loss.lost)
+    told = percent(share, asked=plan.requirements.coverage)
+    return f"{told} by {pairs_words(asked.views)}"
+
+
 def proof_words(kind: str, count: SurvivingCountRecord) -> str:
     """Return what was proved of a number of devices."""
     devices, least = count_words(count.count, kind), count.lower_bound
