@@ -9,6 +9,8 @@ import numpy as np
 
 from .arrays import Array
 
+# Beyond any lens; the roots of more may overflow.
+_FINITE = 1e30
 Terms = tuple[float, float, float, float, float]
 
 
@@ -50,7 +52,7 @@ def fold(terms: Terms) -> float:
 
         1 + 3 k1 r^2 + 5 k2 r^4 + 7 k3 r^6 > 7 |a| r
     """
-    k1, k2, p1, p2, k3 = terms
+    k1, k2, p1, p2, k3 = np.clip(terms, -_FINITE, _FINITE).tolist()
     aside = 7.0 * float(np.hypot(p1, p2))
     # In 1/r, of which the first coefficient is 1 whatever the lens.
     roots = np.roots([1.0, -aside, 3.0 * k1, 0.0, 5.0 * k2, 0.0, 7.0 * k3])

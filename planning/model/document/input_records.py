@@ -134,6 +134,9 @@ class ModelRecord(Part):
     def _images_by_one_law(self) -> Self:
         if self.K is not None and (self.pixel_pitch_m or self.beam_radius):
             raise ValueError("K excludes pixel_pitch_m and beam_radius: write one")
+        device = None if self.K is None else self.optics
+        if isinstance(device, PinholeModel) and (fault := lens_fault(device)):
+            raise ValueError(fault)
         return self
 
     @property
@@ -145,16 +148,9 @@ class ModelRecord(Part):
         """
         if self.K is not None:
             bent = () if self.light else (self.distortion or ())
-            lens = np.zeros(5)
-            lens[: len(bent)] = bent
-            k1, k2, p1, p2, k3 = lens.tolist()
-            matrix = np.array(self.K)
-            device = PinholeModel(
-                matrix, self.resolution, self.range_m, (k1, k2, p1, p2, k3)
-            )
-            if fault := lens_fault(device):
-                raise ValueError(f"{self.name}: {fault}")
-            return device
+            k1, k2, p1, p2, k3 = *bent, *[0.0] * (5 - len(bent))
+            size, terms = self.resolution, (k1, k2, p1, p2, k3)
+            return PinholeModel(np.array(self.K), size, self.range_m, terms)
         if self.pixel_pitch_m is None:
             raise ValueError("neither K nor pixel_pitch_m: one says what it images")
         return ParallelModel(

@@ -97,11 +97,18 @@ def test_models_that_the_rig_lacks_are_refused_as_a_file(of_models, tmp_path):
         RigPlan.load(tmp_path / "plan.json")
 
 
-def test_a_lens_that_folds_its_image_is_refused(of_models):
+@pytest.mark.parametrize(
+    "terms", [(0.0, 0.0, -30.0, 0.0, 0.0), (-1e100, 0.0, 0.0, 0.0, 0.0)]
+)
+@pytest.mark.parametrize("of_rig", [False, True])
+def test_a_lens_that_folds_its_image_is_refused(of_models, of_rig, terms):
+    """A camera's, and that of a model of which reference cameras alone may be."""
     document = of_models.to_document()
-    document["cameras"][0]["distortion"] = [0.0, 0.0, -30.0, 0.0, 0.0]
-    with pytest.raises(PlanFileError, match="folds the image"):
+    listed = document["rig"]["more_cameras"] if of_rig else document["cameras"]
+    listed[0]["distortion"] = list(terms)
+    with pytest.raises(PlanFileError, match="folds the image") as refused:
         RigPlan.from_document(document, of_models.surface)
+    assert len(str(refused.value).splitlines()) == 1
 
 
 def test_more_of_a_counted_model_is_what_helps(handmade):
