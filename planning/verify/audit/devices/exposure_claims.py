@@ -7,6 +7,7 @@ import numpy as np
 from geometry.arrays import Array
 from geometry.rays.proximity import closest_points
 from planning.model.document.device_records import ExposureRecord, GreySample
+from planning.model.document.input_records import RigRecord
 from planning.model.light.light_budget import LightBudget
 from planning.model.plan import RigPlan
 from planning.verify.audit.audit_case import AuditCase
@@ -68,9 +69,21 @@ def _audit_light(plan: RigPlan, light: LightBudget, below: AuditFindings) -> Non
     below.same("focal_px", light.focal_px, focal, whose, 1e-6)
     period = None if refresh is None else 1.0 / refresh
     below.same("period_s", light.period_s, period, whose, _EXACT)
-    longest = rig.photometry.get("max_exposure_ms")
-    if longest is not None:
-        below.same("max_exposure_s", light.max_exposure_s, 1e-3 * longest, whose, 1e-9)
+    longest = _longest_s(plan.document.rig)
+    below.same("max_exposure_s", light.max_exposure_s, longest, whose, 1e-9)
+
+
+def _longest_s(rig: RigRecord) -> float | None:
+    """The longest exposure [s]: as written, else the camera's in whole refreshes.
+
+    One refresh at least; None: the rig says nothing that it follows from.
+    """
+    written, stated = rig.photometry.get("max_exposure_ms"), rig.camera.figures
+    rate = rig.projector.figures.frame_rate_hz
+    if written is not None:
+        return 1e-3 * written
+    own = None if stated.exposure_ms is None else 1e-3 * stated.exposure_ms
+    return own if rate is None else max(round((own or 0.0) * rate), 1) / rate
 
 
 def _audit_time(
