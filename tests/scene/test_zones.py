@@ -1,6 +1,7 @@
 """Rooms, keep-out volumes and mounting planes: who may stand where, and who checks."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -24,7 +25,8 @@ from planning.scene.workspace.admissible import (
 from planning.scene.workspace.candidates import Candidates
 from planning.scene.workspace.shell_positions import along_rays, shell_positions
 from planning.verify.audit.audit import audit_plan
-from planning.verify.audit.devices.zone_claims import zone_excess
+from planning.verify.audit.audit_findings import AuditFindings
+from planning.verify.audit.devices.zone_claims import audit_zones, zone_excess
 
 # A ball of 100 mm: devices stand 1050 to 1150 mm from its centre, which is off the
 # origin, so that offsets and positions differ.
@@ -400,6 +402,12 @@ def _tampered(plan, change):
             [[1.0, 0.1, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]],
             "mounting.0.axes: are no rotation",
         ),
+        (
+            "mounting",
+            "axes",
+            [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]],
+            "axes.0: [0.0, 1.0, 0.0] doesn't run along rig.workspace's [1.0, 0.0, 0.0]",
+        ),
     ],
 )
 def test_false_zones_are_named(planned, key, place, value, sentence):
@@ -435,3 +443,41 @@ def test_a_zone_that_was_left_out_is_named(planned):
 
     found = _tampered(planned, change)
     assert any("keep_out: holds 0, but rig.workspace states 1" in f for f in found)
+
+
+@pytest.mark.parametrize("up", ["x", "y", "-z"])
+@pytest.mark.parametrize(
+    "plane",
+    [
+        "normal = [0, 0, -2]",
+        "normal = [1, 0, 0]",
+        "normal = [0.3, -1, 0.2]",
+        "normal = [3e-9, -2, 3e-9]",
+        "normal = [0, 1, 0.2]\nalong = [1, 1, 1]",
+    ],
+)
+def test_the_audit_knows_where_planes_run(workspace_of, handmade, tmp_path, plane, up):
+    """Also those that don't say; turned in itself a plane is another."""
+    honest = workspace_of(
+        f'up = "{up}"\n[[workspace.mounting]]\nname = "plane"\ncentre_mm = [0, 0, 0]\n'
+        f"extent_mm = [3000, 3000]\n{plane}\n"
+    )
+    (box,) = honest.mounting
+    one, two, normal = box.axes
+    other = replace(box, axes=(two, tuple(-x for x in one), normal))
+
+    def told(space):
+        def change(document):
+            rig = load_rig(tmp_path / "rig.toml").to_document()
+            document["rig"]["workspace"] = rig["workspace"]
+            asked = replace(requirements_of(document["requirements"]), workspace=space)
+            document["requirements"] = asked.to_document()
+
+        plan = handmade.tampered(handmade.unclaimed(), change)
+        findings = AuditFindings()
+        audit_zones(SimpleNamespace(plan=plan, kinds=()), findings)
+        return [f for f in findings.failures if ".mounting" in f]
+
+    assert told(honest) == []
+    (sentence,) = told(replace(honest, mounting=(other,)))
+    assert ".mounting.0.axes.0: " in sentence

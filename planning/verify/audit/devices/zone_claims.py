@@ -1,6 +1,7 @@
 """Claims about the zones that devices keep to: whose they are, and who breaks them."""
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,8 @@ from planning.verify.audit.predicates.occlusion import Block, block_of_zone
 
 _KEY = "requirements.workspace"
 _ROUNDING = 1e-9
+# Axes are written to as many.
+_LAST_DIGITS = 1e-14
 
 
 def zone_excess(offsets: Array, space: Workspace) -> list[Array]:
@@ -53,10 +56,11 @@ def audit_zones(case: AuditCase, findings: AuditFindings) -> None:
     _audit_cone(tables, space, findings)
     off = np.array(space.centre) - origin_of(case.plan)
     rooms = [_as_volume(tables)] if "min_mm" in tables else []
+    planes = partial(_audit_plane, up=np.array(space.up))
     for name, boxes, stated, same in (
         ("box", [] if space.box is None else [space.box], rooms, _audit_volume),
         ("keep_out", space.keep_out, tables.get("keep_out") or [], _audit_volume),
-        ("mounting", space.mounting, tables.get("mounting") or [], _audit_plane),
+        ("mounting", space.mounting, tables.get("mounting") or [], planes),
     ):
         findings.holds(
             len(boxes) == len(stated),
@@ -67,7 +71,7 @@ def audit_zones(case: AuditCase, findings: AuditFindings) -> None:
             below = findings.at(name if name == "box" else f"{name}.{place}")
             _audit_box(box, below)
             if place < len(stated):
-                same(box, off, stated[place], below)
+                same(box, off, stated[place], findings=below)
 
 
 def _audit_shell(case: AuditCase, findings: AuditFindings) -> None:
@@ -191,24 +195,37 @@ def _audit_volume(
 
 
 def _audit_plane(
-    box: Box, off: Array, table: Mapping[str, Any], findings: AuditFindings
+    box: Box, off: Array, table: Mapping[str, Any], up: Array, findings: AuditFindings
 ) -> None:
     normal = np.array(table["normal"], dtype=np.float64)
+    normal /= np.linalg.norm(normal)
     sizes = [*table["extent_mm"], table["thickness_mm"]]
     for name, claimed, truth in (
         ("centre_m", off + box.centre_m, 1e-3 * np.array(table["centre_mm"])),
         ("half_m", box.half_m, 0.5e-3 * np.array(sizes)),
-        ("axes.2", box.axes[2], normal / np.linalg.norm(normal)),
+        ("axes.2", box.axes[2], normal),
     ):
         findings.same(name, claimed, truth, "that of rig.workspace", _ROUNDING)
-    if table.get("along") is not None:
-        aside = float(np.dot(box.axes[1], table["along"]))
-        findings.holds(
-            abs(aside) <= _ROUNDING * float(np.linalg.norm(table["along"]))
-            and np.dot(box.axes[0], table["along"]) > 0.0,
-            "axes.0",
-            f"{list(box.axes[0])} doesn't run along rig.workspace's {table['along']}",
-        )
+    along = table.get("along")
+    along = _level(normal, up) if along is None else np.array(along)
+    aside, ahead = abs(np.dot(box.axes[1], along)), np.dot(box.axes[0], along)
+    findings.holds(
+        aside <= _ROUNDING * np.linalg.norm(along) + _LAST_DIGITS and ahead > 0.0,
+        "axes.0",
+        f"{list(box.axes[0])} doesn't run along rig.workspace's {along.tolist()}",
+    )
+
+
+def _level(normal: Array, up: Array) -> Array:
+    """Where a plane runs that doesn't say: up x n, level, by its components.
+
+    On a level plane along x, or y if up is x.
+    """
+    (a, b, c), (x, y, z) = up, normal
+    level = np.array([b * z - c * y, c * x - a * z, a * y - b * x])
+    if np.linalg.norm(level) > _ROUNDING:
+        return level
+    return np.eye(3)[1 if abs(a) > 0.5 else 0]
 
 
 def turned(angles: Array) -> Array:
