@@ -1,6 +1,7 @@
 """Plans of heads: rigid, measured by their own pairs, audited, and refused."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,6 +18,8 @@ from planning.rig.rig import Rig
 from planning.scene.draws import DRAWS
 from planning.scene.placed_bodies import placed_box
 from planning.verify.audit.audit import audit_plan
+from planning.verify.audit.audit_findings import AuditFindings
+from planning.verify.audit.request_claims import audit_request
 
 _BODY = {"size_mm": [420.0, 100.0, 80.0], "centre_mm": [0.0, 0.0, -30.0]}
 
@@ -119,6 +122,26 @@ def test_lies_about_heads_are_found(plan, handmade, change, told):
     lie = handmade.tampered(plan, lambda document: change(document["stations"]))
     failures = audit_plan(lie, n_samples=2000).failures
     assert any(told in failure for failure in failures)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (lambda d, n: None, None),
+        (lambda d, n: d["request"].update(max_heads=n - 1), "request.max_heads is"),
+        (lambda d, n: d["request"].update(max_cameras=99), "request.max_cameras"),
+        (
+            lambda d, n: d["rig"].update(stations={"carrier": "robot", "max": n - 1}),
+            "rig.stations.max is",
+        ),
+    ],
+)
+def test_more_heads_than_were_asked_for_are_found(plan, handmade, change, told):
+    n, findings = len(plan.document.stations.stations), AuditFindings()
+    lie = handmade.tampered(plan, lambda document: change(document, n))
+    audit_request(SimpleNamespace(plan=lie), findings)
+    named = [f for f in findings.failures if f.startswith(("stations:", "request."))]
+    assert any(told in f for f in named) if told else named == []
 
 
 def test_a_housing_between_another_head_and_the_object_is_found(plan, handmade):

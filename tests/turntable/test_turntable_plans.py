@@ -1,6 +1,7 @@
 """Plans before a turntable: turned rigidly, audited, and refused."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -31,6 +32,8 @@ from planning.report.summary.devices.station_lines import station_lines, trade_l
 from planning.scene.draws import DRAWS
 from planning.steps.prepare import prepared
 from planning.verify.audit.audit import audit_plan
+from planning.verify.audit.audit_findings import AuditFindings
+from planning.verify.audit.request_claims import audit_request
 from planning.verify.reconstruction.render.mitsuba.scene_text import (
     Shine,
     Window,
@@ -314,6 +317,39 @@ def test_lies_about_steps_are_found(plan, handmade, change, told):
     lie = handmade.tampered(plan, lambda document: change(document["stations"]))
     failures = audit_plan(lie, n_samples=2000).failures
     assert any(told in failure for failure in failures)
+
+
+@pytest.mark.parametrize(
+    ("asked", "told"),
+    [
+        ({}, None),
+        ({"max_projectors": 0}, "requirements.max_projectors: "),
+        ({"max_cameras": 0}, "requirements.max_cameras: "),
+        ({"max_heads": 2}, "request.max_heads (there): "),
+    ],
+)
+def test_more_at_a_step_than_was_asked_for_is_found(plan, handmade, asked, told):
+    """Also where what was used says that as many were allowed."""
+    lie = handmade.tampered(plan, lambda document: document["request"].update(asked))
+    findings = AuditFindings()
+    audit_request(SimpleNamespace(plan=lie), findings)
+    named = [f for f in findings.failures if ".asked" not in f]
+    assert [f.startswith(told) for f in named] == [True] if told else named == []
+
+
+def test_one_step_of_more_devices_is_found(plan, handmade):
+    """Though all steps together have no more than was asked of each."""
+
+    def change(document):
+        one, other, *_ = document["stations"]["stations"]
+        most = document["request"]["max_projectors"]
+        one["projectors"] = [*one["projectors"], *other["projectors"]]
+        one["projectors"] = (one["projectors"] * most)[: most + 1]
+
+    findings = AuditFindings()
+    lie = handmade.tampered(plan, change)
+    audit_request(SimpleNamespace(plan=lie), findings)
+    assert any("are at one, but request.max_projectors" in f for f in findings.failures)
 
 
 def test_a_step_of_devices_that_the_plan_lacks_is_refused(plan, handmade):

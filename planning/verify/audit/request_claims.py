@@ -62,7 +62,7 @@ def audit_request(case: AuditCase, findings: AuditFindings) -> None:
     if request is not None:
         pairs += [*_of_request(case.plan, request), *_defaults(case.plan, request)]
         _audit_stated(case.plan, findings.at("rig"))
-        _audit_at_a_step(case.plan, request, findings.at("requirements"))
+        _audit_stations(case.plan, request, findings)
     for key, used, whose, asked in pairs:
         findings.same(key, used, asked, whose, _ROUNDING)
     _audit_digests(case.plan, findings)
@@ -82,22 +82,40 @@ def _audit_stated(plan: RigPlan, findings: AuditFindings) -> None:
         findings.same(f"{key}.light", model.light, rig.light, "rig.light")
 
 
-def _audit_at_a_step(
+def _audit_stations(
     plan: RigPlan, request: RequestRecord, findings: AuditFindings
 ) -> None:
-    """Before a turntable, numbers are asked of a step and used of all of them."""
-    if plan.document.rig.turntable is None or plan.document.stations is None:
-        return
-    steps = len(plan.document.stations.stations)
+    """No more heads stand than were asked for, and no more devices at any step.
+
+    Before a turntable numbers are asked of a step, and used of all of them.
+    """
+    rig, told = plan.document.rig, plan.document.stations
+    steps = () if told is None else told.stations
+    if rig.turntable is None:
+        for whose, most in (
+            ("request.max_heads", request.max_heads),
+            ("rig.stations.max", rig.stations and rig.stations.max),
+        ):
+            findings.holds(
+                most is None or len(steps) <= most,
+                "stations",
+                f"{len(steps)} are planned, but {whose} is {most}",
+            )
     for kind in ("projector", "camera"):
-        name = f"max_{kind}s"
-        used = getattr(plan.requirements, name)
-        whose, asked = _most(plan.document.rig, request, kind)
-        findings.holds(
-            asked is None or (used is not None and used <= steps * asked),
-            name,
-            f"{used} is claimed of {steps} steps, but {whose} is {asked}",
-        )
+        name, (whose, most) = f"max_{kind}s", _most(rig, request, kind)
+        if rig.turntable is not None and steps and most is not None:
+            used = getattr(plan.requirements, name)
+            there = max(len(getattr(step, f"{kind}s")) for step in steps)
+            findings.holds(
+                used is not None and used <= len(steps) * most and there <= most,
+                f"requirements.{name}",
+                f"{used} is claimed of {len(steps)} steps, and {there} {kind}s are at "
+                f"one, but {whose} is {most}",
+            )
+        if rig.head is not None and request.max_heads is not None:
+            each = sum(device.kind == kind for device in rig.head.devices)
+            asked, truth = getattr(request, name), each * request.max_heads
+            findings.same(f"request.{name}", asked, truth, "that of all heads")
 
 
 def _most(rig: RigRecord, request: RequestRecord, kind: str) -> tuple[str, int | None]:
@@ -127,7 +145,8 @@ def _of_request(plan: RigPlan, request: RequestRecord) -> Iterator[_Pair]:
         "dominant_coverage": as_asked,
         "region_coverage": as_asked,
     }
-    if document.rig.turntable is None:
+    turned = document.rig.turntable is not None
+    if not turned or document.stations is None:
         for kind in ("projector", "camera"):
             key = f"max_{kind}s"
             most = _most(document.rig, request, kind)
@@ -160,7 +179,9 @@ def _of_request(plan: RigPlan, request: RequestRecord) -> Iterator[_Pair]:
         asks = request.views or 1, request.survive
         yield "requirements.survival", have, "request.views, request.survive", asks
     heads, stations = request.max_heads is not None, document.stations is not None
-    if document.rig.turntable is None:
+    if turned:
+        yield "request.max_heads (there)", heads, "that of a turntable", False
+    else:
         yield "stations (there)", stations, "request.max_heads (there)", heads
     if not document.truncated:
         yield (
