@@ -16,6 +16,12 @@ from .held_figures import EXACTLY, WHOLLY
 from .no_claims import is_under, under
 
 OVER_POSES = "bounds over all poses: not derived again, which --proofs does"
+# Of a member that is verified without its family.
+OF_MEMBER = (
+    "that it is one of a family, which isn't here, and what all members tell together: "
+    "their ball (requirements.workspace.centre, object_radius_m), rings spaced and "
+    "left out for them (projectors.*.rings), axes in their middle (ring_axes.taken)"
+)
 
 # Claims that the audit holds against others, but doesn't recompute; by what they say.
 ON_TRUST = {
@@ -144,6 +150,8 @@ def taken_on_trust(
     if claims_held == WHOLLY:
         return of_check
     lines = [*held_against_others(plan, over_poses), *of_surface(plan, claims_held)]
+    if plan.of_member:
+        lines.append(OF_MEMBER)
     for kind in ("projectors", "cameras"):
         proof = getattr(plan.document.certificates, kind)
         if proof is None or not proof.needed.lower_bound:

@@ -38,7 +38,7 @@ from planning.verify.reconstruction.render.photometry import Photometry, assumed
 from planning.verify.reconstruction.scanner import Scanner
 
 from .held_figures import WHOLLY, Again, hold_claims, hold_figures
-from .trust import held_against_others, taken_on_trust
+from .trust import OF_MEMBER, held_against_others, taken_on_trust
 from .verdict import Verification
 
 
@@ -210,7 +210,12 @@ def _verify_family(
         claims_held=held,
         trusted=(
             *believed,
-            *(f"{name}: {line}" for name, one in found for line in one.trusted),
+            *(
+                f"{name}: {line}"
+                for name, one in found
+                for line in one.trusted
+                if line != OF_MEMBER
+            ),
         ),
     )
 

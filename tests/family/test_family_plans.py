@@ -20,6 +20,7 @@ from planning.steps.family.family_plan import family_plan, met, with_members
 from planning.verify.audit.audit import audit_plan
 from planning.verify.audit.audit_case import examine
 from planning.verify.family import audit_family
+from planning.verify.trust import OF_MEMBER
 
 # Options of the command line that aren't given.
 _NOTHING = dict.fromkeys(
@@ -243,12 +244,16 @@ def test_members_have_the_same_rig_and_each_its_own_claims(both):
 def test_every_claim_holds_and_what_is_written_is_read(both, kept):
     again = RigPlan.load(kept)
     assert again.to_document() == both.to_document()
-    assert verify_plan(again, check_pixels=False, threads=1).failures == ()
+    found = verify_plan(again, check_pixels=False, threads=1)
+    assert found.failures == ()
+    assert not any(OF_MEMBER in line for line in found.trusted)
 
 
 def test_a_member_may_be_verified_by_itself(kept):
     member = RigPlan.load(kept.parent / "members" / "member-2" / "plan.json")
-    assert verify_plan(member, check_pixels=False, threads=1).failures == ()
+    found = verify_plan(member, check_pixels=False, threads=1)
+    assert found.failures == ()
+    assert OF_MEMBER in found.trusted
 
 
 @pytest.mark.long

@@ -14,6 +14,7 @@ from planning.verify.audit.counts.certificate_claims import (
 from planning.verify.audit.counts.cost_claims import audit_cost
 from planning.verify.audit.counts.joint_claims import audit_joint
 from planning.verify.audit.counts.marginal_claims import audit_marginal
+from planning.verify.audit.counts.member_claims import audit_members
 from planning.verify.audit.counts.overlap_claims import (
     audit_groups,
     audit_overlaps,
@@ -86,6 +87,7 @@ _CLAIMS = (
     audit_tables,
     audit_marginal,
     audit_shares,
+    audit_members,
     audit_certificates,
     audit_joint,
     audit_baselines,
@@ -121,6 +123,7 @@ _CLAIMS_OF_VIEWS = (
     audit_floors,
     audit_tables,
     audit_shares,
+    audit_members,
     audit_certificates,
     audit_baselines,
     audit_groups,

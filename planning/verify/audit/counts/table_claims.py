@@ -74,7 +74,7 @@ def audit_tables(case: AuditCase, findings: AuditFindings) -> None:
 
 
 def audit_shares(case: AuditCase, findings: AuditFindings) -> None:
-    """Check the dominant share, the mesh areas, and members of a single mesh."""
+    """Check the dominant share and the mesh areas."""
     document, surface = case.plan.document, case.plan.surface
     total = surface.mesh.area
     share = float(surface.mesh.face_areas[surface.in_dominant].sum() / total)
@@ -82,21 +82,6 @@ def audit_shares(case: AuditCase, findings: AuditFindings) -> None:
     findings.number("surface.dominant_share", claimed, share, ROUNDING, "")
     areas = sum(mesh.area_m2 for mesh in document.meshes)
     findings.number("meshes.area_m2 (sum)", areas, total, POINT * 1e-2 * total)
-    if len(document.meshes) == 1 and document.members:
-        member, checked = document.members[0], document.reconstruction
-        sole = len(document.members) == 1
-        regions = tuple(region.id for region in document.regions)
-        for name, same in (
-            ("mesh", member.mesh == 0),
-            ("regions", member.regions == regions),
-            ("coverage", sole and member.coverage == document.coverage),
-            ("reconstruction", member.reconstruction in (checked, None)),
-        ):
-            findings.holds(
-                same,
-                f"members.0.{name}",
-                "differs from the plan's, of which it is the only member",
-            )
 
 
 _ROUNDING = 1e-9
