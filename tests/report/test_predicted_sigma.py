@@ -200,15 +200,32 @@ def test_the_noise_of_coded_pixels_is_told_with_that_of_the_phase(
     assert f"px edge noise{words} the panel's pixels alone" in alone
 
 
-@pytest.mark.parametrize("name", ["focus_m", "aperture_m"])
-def test_another_focus_than_the_rigs_is_found(plan, case, name):
+def _told_of_limits(plan, case, change):
+    findings = AuditFindings()
+    audit_limits(replace(case, plan=tampered(plan, change)), findings)
+    return list(findings.failures)
+
+
+@pytest.mark.parametrize("name", ["focus_m", "aperture_m", "in_focus_m", "camera_px"])
+def test_other_edges_than_the_rigs_and_the_renderers_are_found(plan, case, name):
     def change(document):
         document["requirements"]["triangulation"]["drawn_edges"][name] *= 1.1
 
-    findings = AuditFindings()
-    audit_limits(replace(case, plan=tampered(plan, change)), findings)
-    (failure,) = findings.failures
+    assert _told_of_limits(plan, case, lambda _: None) == []
+    (failure,) = _told_of_limits(plan, case, change)
     assert failure.startswith(f"requirements.triangulation.drawn_edges.{name}")
+
+
+@pytest.mark.parametrize("before", [False, True])
+def test_edges_are_left_out_of_plans_from_before_alone(plan, case, before):
+    def change(document):
+        document["requirements"]["triangulation"]["drawn_edges"] = None
+        if before:
+            del document["request"]
+
+    found = _told_of_limits(plan, case, change)
+    key = "requirements.triangulation.drawn_edges: None is claimed"
+    assert [line.startswith(key) for line in found] == ([] if before else [True])
 
 
 def test_exposures_and_greys_are_planned_and_told(plan):

@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from planning.model.light.drawn_edges import CAMERA_PX, IN_FOCUS_M
 from planning.model.plan import RigPlan
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings, square_centimetres
@@ -136,27 +137,38 @@ def audit_limits(case: AuditCase, findings: AuditFindings) -> None:
     if ambient is not None:
         key, claimed = "requirements.check.ambient", case.plan.requirements.check
         findings.same(key, claimed.ambient, ambient, "rig.check.ambient", _ROUNDING)
-    _audit_focus(case.plan, findings)
+    _audit_drawn_edges(case.plan, findings)
 
 
-def _audit_focus(plan: RigPlan, findings: AuditFindings) -> None:
-    """Where edges are said to be sharp the rig's projector is focused, and as wide."""
+def _audit_drawn_edges(plan: RigPlan, findings: AuditFindings) -> None:
+    """Edges are as blurred as the check renders them, in focus where the rig's are.
+
+    A plan that doesn't say what was asked is from before, and may say nothing of them.
+    """
+    findings = findings.at("requirements.triangulation.drawn_edges")
     drawn = plan.requirements.triangulation.drawn_edges
     model = plan.document.rig.projector
     focus, pixel_um = model.figures.focus, model.figures.pixel_um
-    if drawn is None:
+    if drawn is None or plan.cameras_alone:
+        findings.holds(
+            (drawn is None) is plan.cameras_alone or plan.document.request is None,
+            "",
+            f"{drawn!r} is claimed, but light draws edges unless cameras are alone",
+        )
         return
     place, pupil = None, 0.0
     if focus is not None and pixel_um is not None and model.K is not None:
         place = 1e-3 * focus.distance_mm
         focal_px = math.sqrt(model.K[0][0] * model.K[1][1])
         pupil = 1e-6 * pixel_um * focal_px / focus.f_number
-    for name, claimed, truth in (
-        ("focus_m", drawn.focus_m, place),
-        ("aperture_m", drawn.aperture_m, pupil),
+    rigs, rendered = "rig.projector.figures.focus", "what the check renders with"
+    for name, claimed, truth, whose in (
+        ("focus_m", drawn.focus_m, place, rigs),
+        ("aperture_m", drawn.aperture_m, pupil, rigs),
+        ("in_focus_m", drawn.in_focus_m, IN_FOCUS_M, rendered),
+        ("camera_px", drawn.camera_px, CAMERA_PX, rendered),
     ):
-        key = f"requirements.triangulation.drawn_edges.{name}"
-        findings.same(key, claimed, truth, "rig.projector.figures.focus", _ROUNDING)
+        findings.same(name, claimed, truth, whose, _ROUNDING)
 
 
 def audit_scales(case: AuditCase, findings: AuditFindings) -> None:
