@@ -8,6 +8,7 @@ from click.testing import CliRunner
 from planning.cli.main import commands
 from planning.model.errors import PlanFileError
 from planning.model.plan import RigPlan
+from planning.verify.verification import verify_plan
 
 
 @pytest.fixture(scope="module")
@@ -71,6 +72,54 @@ def test_what_none_can_compute_with_is_refused_in_a_line(
     plan, folder, tmp_path, place, value, fault
 ):
     assert fault in refused(folder, tmp_path, edited(plan, place, value))
+
+
+ZONE = {"name": "press", "centre_mm": [0, 0, 0], "turn_deg": [0, 0, 0]}
+PLANE = {"name": "wall", "centre_mm": [0, 0, 0], "normal": [0, 0, 1]}
+PLANE |= {"extent_mm": [1, 1], "thickness_mm": 10}
+CODE = {"shifts": 4, "period_px": 16, "phase_noise_deg": 1}
+
+
+@pytest.mark.parametrize(
+    ("table", "value", "fault"),
+    [
+        ("dense", [1], "rig.dense = [1] should be an object"),
+        ("dense", {"shifts": 4}, "dense.period_px is missing"),
+        ("dense", CODE | {"phase_noise_deg": "1"}, "'1' should be a valid number"),
+        ("dense", CODE | {"period_px": 17}, "period_px = 17 must be a power of two"),
+        ("photometry", {"gain_db": "3"}, "photometry.quantum_efficiency is missing"),
+        ("calibration", {"angle_deg": True}, "angle_deg = True should be a valid"),
+        ("rings", {"margin_m": None}, "rings.margin_m = None should be a valid"),
+        ("workspace", {"axis": [0, 0, 0]}, "axis = [0, 0, 0] should be a direction"),
+        ("workspace", {"keep_out": 5}, "keep_out = 5 should be a valid array"),
+        ("workspace", {"keep_out": [ZONE]}, "keep_out.0.size_mm is missing"),
+        ("workspace", {"min_mm": [0, 0, 0]}, "should have min_mm and max_mm"),
+        ("workspace", {"mounting": "x"}, "mounting = 'x' should be a valid array"),
+        ("workspace", {"mounting": [{}]}, "mounting.0.name is missing"),
+        (
+            "workspace",
+            {"mounting": [PLANE | {"along": "abc"}]},
+            "mounting.0.along = 'abc' should be a valid array",
+        ),
+        (
+            "workspace",
+            {"mounting": [PLANE | {"normal": [0, 0, 0]}]},
+            "mounting.0.normal = [0, 0, 0] should be a direction",
+        ),
+    ],
+)
+def test_rig_tables_that_none_can_compute_with_are_refused_in_a_line(
+    plan, folder, tmp_path, table, value, fault
+):
+    line = refused(folder, tmp_path, edited(plan, f"rig.{table}", value))
+    assert fault in line
+
+
+@pytest.mark.parametrize("kind", ["projectors", "cameras"])
+def test_a_plan_of_no_device_is_not_verified(plan, handmade, kind):
+    bare = handmade.tampered(plan, lambda document: document.update({kind: []}))
+    with pytest.raises(PlanFileError, match=rf"{kind} = \[\]: nothing can be"):
+        verify_plan(bare, check_pixels=False)
 
 
 def test_many_even_rings_are_refused_before_they_fill_the_memory(plan, handmade):

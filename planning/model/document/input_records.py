@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from geometry.devices import ParallelModel, PinholeModel
 from planning.model.devices.bodies import Body
 from planning.model.devices.lens_fault import lens_fault
+from planning.model.devices.stated_tables import STATED_TABLES, check_stated
 
 from .head_records import CarrierRecord, HeadRecord, TurntableRecord
 from .part import Count, FileName, Interval, Matrix3, Part, Resolution, Size, Vector3
@@ -187,14 +188,6 @@ class ObstacleRecord(Part):
         return self
 
 
-# Keys of the rig's tables that hold a number, or null.
-_NUMBERS = {
-    "rings": ("tilt", "shift_m", "gap_m", "margin_m", "outer_radius"),
-    "workspace": ("half_angle_deg", "floor_mm"),
-    "calibration": ("angle_deg", "position_mm", "focal_percent", "principal_px"),
-}
-
-
 class RigRecord(Part):
     """The resolved rig; tables whose keys end in _mm or _deg are as in its file.
 
@@ -228,29 +221,13 @@ class RigRecord(Part):
     head: HeadRecord | None = None
     turntable: TurntableRecord | None = None
     stations: CarrierRecord | None = None
+    dense: dict[str, Any] = Field(default={})
 
     @model_validator(mode="after")
-    def _numbers(self) -> Self:
-        for table, names in _NUMBERS.items():
-            for name in names:
-                value = getattr(self, table).get(name)
-                # A truth is a whole number to Python, and none in a file.
-                if isinstance(value, bool) or not isinstance(value, float | int | None):
-                    raise ValueError(f"{table}.{name} = {value!r} should be a number")
-        if self.rings.get("margin_m", 0.0) is None:
-            raise ValueError("rings.margin_m = None should be a number")
-        return self
-
-    @model_validator(mode="after")
-    def _axis(self) -> Self:
-        axis = self.workspace.get("axis")
-        numbers = isinstance(axis, list) and [
-            x for x in axis if isinstance(x, float | int) and not isinstance(x, bool)
-        ]
-        if axis is not None and not (
-            numbers and len(numbers) == len(axis) == 3 and any(numbers)
-        ):
-            raise ValueError(f"workspace.axis = {axis!r} should be a direction")
+    def _tables(self) -> Self:
+        for name in STATED_TABLES:
+            if table := getattr(self, name):
+                check_stated(name, table)
         return self
 
     def models(self, kind: str) -> tuple[ModelRecord, ...]:

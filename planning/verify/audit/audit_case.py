@@ -11,6 +11,7 @@ from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.document.certificates import Certificate
 from planning.model.document.device_records import CameraRecord, ProjectorRecord
 from planning.model.document.input_records import ModelRecord
+from planning.model.errors import PlanFileError
 from planning.model.plan import RigPlan
 from planning.verify.audit.predicates.audit_devices import (
     AuditCamera,
@@ -168,7 +169,15 @@ class AuditCase:
 def examine(
     plan: RigPlan, *, seed: int, threads: int, n_samples: int = N_SAMPLES
 ) -> AuditCase:
-    """Recompute what a plan's devices do to fresh samples."""
+    """Recompute what a plan's devices do to fresh samples.
+
+    Raises:
+        PlanFileError: If there is no device of a kind that the pattern takes.
+    """
+    kinds = ("cameras",) if plan.cameras_alone else ("projectors", "cameras")
+    for kind in kinds:
+        if not getattr(plan, kind):
+            raise PlanFileError(f"{kind} = []: nothing can be verified; plan again")
     samples = draw_samples(plan.surface, plan.requirements.target, n_samples, seed)
     shadow = Shadow.of(plan, threads=threads)
     actual = what_devices_do(plan, samples, shadow)

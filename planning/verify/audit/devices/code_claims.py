@@ -1,6 +1,8 @@
 """Claims about what projectors show: rings, or the code of the rig's `[dense]`."""
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +31,7 @@ def audit_codes(case: AuditCase, findings: AuditFindings) -> None:
             f"{plan.requirements.pattern!r}",
         )
         if dense and record.code is not None:
-            _audit_code(record, plan.document.rig.model_extra or {}, below)
+            _audit_code(record, plan.document.rig.dense, below)
     if not dense:
         return
     axes = plan.document.ring_axes
@@ -45,13 +47,12 @@ def audit_codes(case: AuditCase, findings: AuditFindings) -> None:
 
 
 def _audit_code(
-    record: ProjectorRecord, rig: dict[str, object], findings: AuditFindings
+    record: ProjectorRecord, table: Mapping[str, Any], findings: AuditFindings
 ) -> None:
-    table = rig.get("dense")
     stated = DenseCode()
-    if isinstance(table, dict):
-        noise = math.radians(float(table["phase_noise_deg"]))
-        stated = DenseCode(int(table["shifts"]), int(table["period_px"]), noise)
+    if table:
+        noise = math.radians(table["phase_noise_deg"])
+        stated = DenseCode(table["shifts"], table["period_px"], noise)
     for name in ("shifts", "period_px", "phase_noise"):
         claimed, truth = getattr(record.code, name), getattr(stated, name)
         findings.same(f"code.{name}", claimed, truth, f"rig.dense.{name}", _ROUNDING)
