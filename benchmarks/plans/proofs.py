@@ -141,7 +141,7 @@ def _rows(plan: RigPlan, least_s: float) -> Iterator[tuple[list[str], bool]]:
             continue
         proof = plan.proof.proofs[kind.name]
         raised = _refused(case, kind)
-        samples = drawn_again(case, proof.draws, proof.faces)
+        samples = drawn_again(case, kind.name, proof.draws, proof.faces)
         covers = covered_by_candidates(case, kind.name, samples)
         required = int(np.ceil(kind.share * int(covers.any(axis=1).sum()) - 1e-9))
         asked = covers, required, least - 1, max(least_s, _limit(covers, required))

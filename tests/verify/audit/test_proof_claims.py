@@ -28,12 +28,14 @@ _KINDS = ("projector", "camera")
 def case(handmade, request) -> AuditCase:
     """A small plan by hand, with the certificates that are true of it."""
     plan = handmade.build_plan(request.param)
+    for kind in _KINDS:
+        plan = with_bound(plan, kind, n_samples=300)
     case = examine(plan, seed=1, n_samples=1000, threads=1)
     proofs: dict[str, CoverProof] = {}
     for kind in case.kinds:
         stream = 100 if kind.name == "projector" else 200
         drawn = _drawn(plan, 300, stream)
-        samples = drawn_again(case, drawn.draws, drawn.faces)
+        samples = drawn_again(case, kind.name, drawn.draws, drawn.faces)
         covers = covered_by_candidates(case, kind.name, samples)
         required = int(np.ceil(kind.share * covers.any(axis=1).sum() - 1e-9))
         fewest = next(n for n in range(20) if not certificate(covers, n, required))
@@ -128,6 +130,7 @@ _EDITS: dict[str, Callable[[CoverProof], CoverProof]] = {
     "samples aren't": lambda p: replace(p, draws=p.draws + [0, 1, 0]),
     "made again": lambda p: replace(p, draws=p.draws * [1, 1, 0]),
     "can't be made": lambda p: replace(p, draws=np.concatenate([p.draws, p.draws])),
+    "are of streams": lambda p: replace(p, draws=p.draws + [0, 13, 0]),
     "candidates, there are": lambda p: replace(p, stand_in=p.stand_in[:1] * 0),
 }
 
@@ -138,6 +141,15 @@ def test_each_field_that_was_edited_is_refused(case, kind, words) -> None:
     lines, false = held(case, with_proof(case.plan, kind, _EDITS[words]))
     assert len(lines) == len(false) == 1
     assert words in false[0]
+
+
+@pytest.mark.parametrize("kind", _KINDS)
+def test_a_proof_of_fewer_samples_than_the_certificate_is_refused(case, kind) -> None:
+    _, false = held(case, with_bound(case.plan, kind, n_samples=300))
+    assert not false
+    _, false = held(case, with_bound(case.plan, kind, n_samples=301))
+    assert len(false) == 1
+    assert "it is of 300 samples, not of 301" in false[0]
 
 
 def test_a_certificate_that_is_missing_is_refused(case) -> None:

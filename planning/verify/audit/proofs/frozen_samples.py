@@ -24,6 +24,9 @@ _NEAR = 1e-9
 _MOST_DRAWS, _MOST_SAMPLES = 16, 100_000
 # Of one draw: fewer don't speak of a surface, and could be picked.
 _FEWEST_SAMPLES = 250
+# The first stream that a cover of each kind is frozen on, and how many later ones may
+# have joined: others could be picked.
+_FIRST_STREAM, _LATER_STREAMS = {"projector": 100, "camera": 200}, 12
 
 
 def covered_by_candidates(case: AuditCase, kind: str, samples: AuditSamples) -> Mask:
@@ -53,29 +56,22 @@ def covered_by_candidates(case: AuditCase, kind: str, samples: AuditSamples) -> 
 
 
 def drawn_again(
-    case: AuditCase, draws: Ints, faces: Ints, points: Array | None = None
+    case: AuditCase,
+    kind: str,
+    draws: Ints,
+    faces: Ints,
+    points: Array | None = None,
 ) -> AuditSamples:
     """Return the samples that draws give, as `CoverProof` has them.
 
     Raises:
-        RefutedProofError: If they don't lie on these faces, or at these points.
+        RefutedProofError: If they don't lie on these faces, or at these points, or are
+            of other streams or fewer than the certificate speaks of.
     """
+    _require_own(case, kind, draws)
     plan, surface = case.plan, case.plan.surface
     within = surface.target_faces(plan.requirements.target)
     places, owners = list[Array](), list[Ints]()
-    counts = draws[:, 0]
-    if not (
-        1 <= len(counts) <= _MOST_DRAWS
-        and np.all((counts >= 1) & (counts <= _MOST_SAMPLES))
-        and counts.sum() <= _MOST_SAMPLES
-        and np.all(draws[:, 1:] >= 0)
-        and np.all(draws[:, 2] >= 1)
-        and np.all(sizes_of(draws) >= _FEWEST_SAMPLES)
-        and len(np.unique(draws[:, 1])) == len(counts)
-    ):
-        raise RefutedProofError(
-            f"its draws can't be made again, or one gives less than {_FEWEST_SAMPLES}"
-        )
     for count, stream, every in draws.tolist():
         mixed = np.random.SeedSequence([plan.document.seed, stream])
         seed = int(mixed.generate_state(1)[0])
@@ -88,3 +84,34 @@ def drawn_again(
     if not (np.array_equal(of, faces) and same):
         raise RefutedProofError("its samples aren't those that its draws give")
     return samples_on(surface, at, of, np.ones(len(of), dtype=bool))
+
+
+def _require_own(case: AuditCase, kind: str, draws: Ints) -> None:
+    """Refuse draws that can't be made again, or aren't those of a kind's certificate.
+
+    Raises:
+        RefutedProofError: If they aren't.
+    """
+    counts, streams = draws[:, 0], draws[:, 1]
+    if not (
+        1 <= len(counts) <= _MOST_DRAWS
+        and np.all((counts >= 1) & (counts <= _MOST_SAMPLES))
+        and counts.sum() <= _MOST_SAMPLES
+        and np.all(draws[:, 1:] >= 0)
+        and np.all(draws[:, 2] >= 1)
+        and np.all(sizes_of(draws) >= _FEWEST_SAMPLES)
+        and len(np.unique(streams)) == len(counts)
+    ):
+        raise RefutedProofError(
+            f"its draws can't be made again, or one gives less than {_FEWEST_SAMPLES}"
+        )
+    later = streams - _FIRST_STREAM[kind]
+    if not np.all((later >= 0) & (later <= _LATER_STREAMS)):
+        raise RefutedProofError(
+            f"its draws are of streams {streams.tolist()}, {kind}s' begin with "
+            f"{_FIRST_STREAM[kind]} and end {_LATER_STREAMS} later"
+        )
+    claims = getattr(case.plan.document.certificates, f"{kind}s")
+    n = int(sizes_of(draws).sum())
+    if n < claims.n_samples:
+        raise RefutedProofError(f"it is of {n} samples, not of {claims.n_samples}")

@@ -1,7 +1,7 @@
 """Bounds over the candidates: derived again from the plan, its mesh and `proof.npz`.
 
-Samples are drawn again, by the streams that the file names: so whoever wrote it chose
-a seed and no sample. What candidates cover is decided by the audit's predicates. The
+Samples are drawn again, as many as the plan says or more, of the streams that are a
+kind's own: so whoever wrote it chose a seed and no sample. What candidates cover is decided by the audit's predicates. The
 certificate alone is taken from the file, and holds or doesn't.
 """
 
@@ -61,7 +61,7 @@ def _derived(case: AuditCase, kind: str, claims: Certificate, share: float) -> s
     least = max(claims.needed.lower_bound, claims.candidates.lower_bound)
     if proof.n_sets + 1 < least:
         raise RefutedProofError(f"the certificate is of {proof.n_sets + 1}")
-    samples = drawn_again(case, proof.draws, proof.faces, proof.points)
+    samples = drawn_again(case, kind, proof.draws, proof.faces, proof.points)
     covers = covered_by_candidates(case, kind, samples)
     if len(proof.stand_in) != covers.shape[1]:
         raise RefutedProofError(

@@ -34,6 +34,8 @@ def case(handmade, request) -> AuditCase:
 
     def ask_for_nearly_all(document: dict[str, Any]) -> None:
         document["requirements"] |= {"coverage": 0.95, "dominant_coverage": 0.95}
+        for kind in ("projectors", "cameras"):
+            document["certificates"][kind]["n_samples"] = _N
 
     plan = handmade.tampered(handmade.build_plan(request.param), ask_for_nearly_all)
     case = examine(plan, seed=1, n_samples=1000, threads=1)
@@ -55,7 +57,7 @@ def _proof(case: AuditCase, kind: str) -> PoseProof:
 
 def _claim(case: AuditCase, kind: str) -> ContinuousProof:
     proof = _proof(case, kind)
-    samples = drawn_again(case, proof.draws, proof.faces)
+    samples = drawn_again(case, kind, proof.draws, proof.faces)
     covers = covered_by_candidates(case, kind, samples)
     lit = np.any(lit_by_plan(case, kind, samples), axis=0)
     return ContinuousProof(
@@ -138,7 +140,7 @@ def test_what_existing_devices_cover_is_free(handmade, case) -> None:
         document["requirements"]["existing"] = [one]
 
     proof = case.plan.proof.over_poses["projector"]
-    samples = drawn_again(case, proof.draws, proof.faces)
+    samples = drawn_again(case, "projector", proof.draws, proof.faces)
     reached = covered_by_candidates(case, "projector", samples).any(axis=1)
     limits = case.plan.requirements.projector
     # Whatever its rings, of which some may be too narrow.

@@ -120,7 +120,8 @@ def _derived(
         raise RefutedProofError("the file has no certificate of it")
     if proof.n_devices + 1 + given < table.lower_bound:
         raise RefutedProofError(f"the certificate is of {proof.n_devices + 1 + given}")
-    every, n = drawn_again(case, proof.draws, proof.faces), len(proof.multipliers)
+    every = drawn_again(case, kind.name, proof.draws, proof.faces)
+    n = len(proof.multipliers)
     if not proof.is_of_whole_draws:
         raise RefutedProofError(
             f"of its {n} samples {proof.n_whole} are of whole draws"
