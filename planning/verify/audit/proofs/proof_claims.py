@@ -1,8 +1,9 @@
 """Bounds over the candidates: derived again from the plan, its mesh and `proof.npz`.
 
 Samples are drawn again, as many as the plan says or more, of the streams that are a
-kind's own: so whoever wrote it chose a seed and no sample. What candidates cover is decided by the audit's predicates. The
-certificate alone is taken from the file, and holds or doesn't.
+kind's own: so whoever wrote it chose a seed and no sample. What candidates cover is
+decided by the audit's predicates. The certificate alone is taken from the file, and
+holds or doesn't.
 """
 
 import time
