@@ -244,7 +244,7 @@ def run(command: Callable[[], int], *, debug: bool) -> None:
             leave(code)
         sys.exit(code)
     except KeyboardInterrupt:
-        tell("interrupted before a first plan stood; nothing was written")
+        tell("interrupted before there was anything to keep; nothing was written")
         leave(_INTERRUPTED)
     except BrokenPipeError:
         # Whoever reads stdout has had enough; Python must not complain at exit.

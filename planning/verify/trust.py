@@ -88,6 +88,9 @@ UNAUDITED = {
     ),
     "the region that fewer projectors light worst": ("marginal.*.worst_region*",),
     "how many samples the plan's areas are of": ("coverage.samples",),
+    "within what distance of a sample the check looks for a point": (
+        "requirements.check.tau_m",
+    ),
 }
 # Likewise of the check from pixels.
 UNAUDITED_OF_CHECK = {

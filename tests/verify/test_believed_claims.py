@@ -107,7 +107,7 @@ def named(plan, claims_held, figures_held):
     [
         *("region in surface.npz", "steep in surface.npz"),
         *("regions.*.mean_curvedness", "surface.curvature_radius_m"),
-        "coverage.samples",
+        *("coverage.samples", "requirements.check.tau_m"),
     ],
 )
 def test_what_no_audit_recomputes_is_named_unless_it_came_out_again(checked, key):
