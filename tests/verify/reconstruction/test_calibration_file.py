@@ -192,7 +192,7 @@ BROKEN = {
         r"world_from_device` = .*at least 4 items",
     ),
     "millimetres": (changed(in_millimetres), r"C1: stands .* write metres"),
-    "mirrored": (changed(mirrored), r"must be a rotation"),
+    "mirrored": (changed(mirrored), r"mirrored \(determinant -1"),
     "turned": (changed(turned_by(40.0)), r"C1: is turned by 40.0 degrees.* at most 30"),
     "last row": (
         changed(lambda v: v[1]["world_from_device"].__setitem__(3, [0, 0, 1, 1])),
