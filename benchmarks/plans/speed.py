@@ -135,8 +135,7 @@ def _mesh(name: str, place: Path) -> Path | None:
 
 def _run(mesh: Path, place: Path, words: Sequence[str], cache: Path | None) -> Run:
     folder = {"RINGRIG_CACHE": "" if cache is None else str(cache)}
-    kept = {key: os.environ[key] for key in os.environ if key != _UNCOMPILED}
-    return timed_run(mesh, place, words, kept | folder)
+    return timed_run(mesh, place, words, os.environ | folder)
 
 
 def timed_run(
@@ -147,13 +146,15 @@ def timed_run(
 ) -> Run:
     """Plan a mesh with at most three projectors into a folder of `place`."""
     asked = ["--mesh", str(mesh), "--max-projectors", "3", "-o", str(place / "plan")]
+    found = dict(os.environ if environment is None else environment)
+    found.pop(_UNCOMPILED, None)
     begin, stands = time.monotonic(), 0.0
     with subprocess.Popen(
         [*RUN, *asked, *words],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
-        env=environment,
+        env=found,
     ) as process:
         assert process.stderr is not None
         for line in process.stderr:

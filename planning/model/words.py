@@ -39,6 +39,13 @@ def percent(
     return f"{100.0 * share:.{decimals}f} %"
 
 
+def share_words(
+    part: float, whole: float, asked: float = 0.0, *, of_nothing: str = "none"
+) -> str:
+    """Return which share of a whole a part is, as `percent` does."""
+    return percent(part / whole, asked=asked) if whole > 0.0 else of_nothing
+
+
 def labelled(label: str, lines: Sequence[str]) -> list[str]:
     """Return lines of a block of the summary: its label stands before the first."""
     return [f"{'' if k else label:<9}{line}" for k, line in enumerate(lines)]

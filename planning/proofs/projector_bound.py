@@ -101,14 +101,6 @@ def bound_projectors(
             tree = _positions(scene, templates, samples, maps, effort.finest)
         return question.searched(tree, effort.budget, known), tree
 
-    def may_refute(bound: CellBound) -> bool:
-        """Return whether finer maps may prove more, and aren't too large."""
-        fewer = max(question.count - 1, 1)
-        leaves = bound.status is not CellStatus.PROVED
-        leaves &= bound.over_known >= (1.0 + _ROOM) * fewer
-        finer = cube_map(1 << effort.maps + 1)
-        return leaves and finer.size * len(samples) <= 8.0 * _MAP_BYTES
-
     # Shadows cost most, and what is proved without them holds with them.
     first = effort
     if shadows:
@@ -117,14 +109,15 @@ def bound_projectors(
     bound, tree = searched(first, shadows=False)
     if shadows and bound.status is not CellStatus.PROVED:
         among = searched(effort, shadows=True)
-        if effort.finer_budget and may_refute(among[0]):
-            again = replace(
-                effort,
-                maps=effort.maps + 1,
-                finest=effort.finest + 1,
-                budget=effort.finer_budget,
-            )
-            among = max(among, searched(again, shadows=True), key=_proved)
+        finer = replace(
+            effort,
+            maps=effort.maps + 1,
+            finest=effort.finest + 1,
+            budget=effort.finer_budget,
+        )
+        bits = cube_map(1 << finer.maps).size * len(samples)
+        if finer.budget and bits <= 8.0 * _MAP_BYTES and _leaves_room(among[0]):
+            among = max(among, searched(finer, shadows=True), key=_proved)
         # Cut short, a longer search may have proved less.
         if shadows := among[0].lower_bound >= bound.lower_bound:
             bound, tree = among
@@ -133,6 +126,13 @@ def bound_projectors(
         unrefuted = _promising(bound, tree, effort.offers)
     shadows = shadows or question.count <= 1
     return ContinuousBound(question, bound, shadows, unrefuted)
+
+
+def _leaves_room(bound: CellBound) -> bool:
+    """Return whether fewer than the count weren't refuted, and finer maps may do so."""
+    fewer = max(bound.count - 1, 1)
+    left = bound.status is not CellStatus.PROVED
+    return left and bound.over_known >= (1.0 + _ROOM) * fewer
 
 
 def _proved(found: tuple[CellBound, _Tree]) -> float:

@@ -50,8 +50,6 @@ _TYPES: dict[str, tuple[Any, str]] = {
     "progress": ((Callable, bool), "a function of a line, True or False"),
 }
 _MESH = "a mesh from load_mesh, a list of such, or a body from read_ranges"
-
-
 # Of what is told of a value [characters].
 _LONGEST = 60
 

@@ -37,12 +37,14 @@ _TOLERANCE = 1e-6
 
 
 class _Proposed(NamedTuple):
-    """Multipliers, and whether the poses in hand may be enough.
+    """Multipliers, what the dearest known pose costs by them, and whether poses reach.
 
-    Then no multipliers refute their number, though good ones help whoever looks on.
+    If those in hand may be enough, no multipliers refute their number, though good ones
+    help whoever looks on.
     """
 
     multipliers: NDArray[np.int64]
+    largest_cost: int
     reached: bool
 
 
@@ -101,9 +103,10 @@ class MultiplierSearch:
                 break
             leaves = np.empty(0, dtype=np.int64)
             if self.ratio and not proposal.reached:
-                between = self._between(proposal.multipliers)
-                leaves = self._drilled(n_poses, between)
-                leaves = leaves[self._cut_off(leaves, proposal.multipliers)]
+                leaves = self._drilled(n_poses, self._between(proposal))
+                # Only what costs more than all poses known cuts the proposal off.
+                costs = self._store.costs(leaves, proposal.multipliers)
+                leaves = leaves[costs > proposal.largest_cost * (1.0 + _TOLERANCE)]
             if not leaves.size and self.bound <= n_poses:
                 leaves = self._drilled(n_poses, proposal.multipliers)
             # What is in hand already would change nothing.
@@ -113,18 +116,11 @@ class MultiplierSearch:
             self._take(leaves)
         return self.bound > n_poses
 
-    def _between(self, proposed: NDArray[np.int64]) -> NDArray[np.int64]:
+    def _between(self, proposal: _Proposed) -> NDArray[np.int64]:
         """Return multipliers on the way from the best ones to those proposed."""
-        dearest = int(BitSum(proposed)(self._poses.values).max(initial=1))
         best = self.multipliers / max(1, self.largest_cost)
-        return self._whole.multipliers(best + _STEP * (proposed / dearest - best))
-
-    def _cut_off(
-        self, leaves: NDArray[np.int64], proposed: NDArray[np.int64]
-    ) -> NDArray[np.bool_]:
-        """Return which cells cost more by those proposed than all poses in hand."""
-        dearest = int(BitSum(proposed)(self._poses.values).max(initial=1))
-        return self._store.costs(leaves, proposed) > dearest * (1.0 + _TOLERANCE)
+        proposed = proposal.multipliers / proposal.largest_cost
+        return self._whole.multipliers(best + _STEP * (proposed - best))
 
     def _prepare(self, n_poses: int) -> None:
         self._program.set_count(n_poses)
@@ -142,7 +138,8 @@ class MultiplierSearch:
             reached = proposal.value > -_TOLERANCE * self._whole.weights.size
             multipliers = self._whole.multipliers(proposal.multipliers)
             costs = BitSum(multipliers)(self._poses.values)
-            if not self._taken.size and (largest := int(costs.max(initial=0))):
+            largest = int(costs.max(initial=0))
+            if largest and not self._taken.size:
                 least = float(self._whole.least_cost(multipliers) / largest)
                 self.over_known = max(self.over_known, least)
             in_hand = np.zeros(costs.size, dtype=bool)
@@ -152,7 +149,7 @@ class MultiplierSearch:
             dearest = np.argsort(-costs, kind="stable")[:_TAKEN]
             dearest = dearest[costs[dearest] > most * (1.0 + _TOLERANCE)]
             if reached or not dearest.size:
-                return _Proposed(multipliers, reached)
+                return _Proposed(multipliers, max(1, largest), reached)
             rows = unpack_rows(self._poses.values[dearest], self._whole.weights.size)
             self._program.add(dearest, rows)
         return None

@@ -8,7 +8,7 @@ import numpy as np
 
 from planning.model.document.certificates import Certificate
 from planning.model.plan import RigPlan
-from planning.model.words import percent
+from planning.model.words import share_words
 from planning.report.summary.check_lines import missing_words
 from planning.report.summary.devices.station_lines import STATIONS, device_counts
 from planning.report.summary.family_lines import members_words
@@ -150,15 +150,15 @@ def _coverage(plan: RigPlan) -> Iterator[tuple[str, str]]:
     if not plan.cameras_alone:
         yield (
             "lit of what can be",
-            _share(
+            share_words(
                 areas.lit_m2, areas.reachable_by_projectors_m2, asked.dominant_coverage
             ),
         )
     yield (
         "measured of what can be",
-        _share(areas.measured_m2, areas.reachable_by_cameras_m2, asked.coverage),
+        share_words(areas.measured_m2, areas.reachable_by_cameras_m2, asked.coverage),
     )
-    yield "measured of the target", _share(areas.measured_m2, areas.area_m2)
+    yield "measured of the target", share_words(areas.measured_m2, areas.area_m2)
     if sigma is not None:
         yield "sigma, median [mm]", _mm(sigma.median_m)
         yield "sigma, 95 % within [mm]", _mm(sigma.p95_m)
@@ -206,7 +206,3 @@ def _same_places(first: RigPlan, second: RigPlan) -> int:
 
 def _mm(metres: float | None) -> str:
     return _NONE if metres is None else f"{1e3 * metres:.3f}"
-
-
-def _share(part: float, whole: float, asked: float = 0.0) -> str:
-    return percent(part / whole, asked=asked) if whole > 0.0 else "none"

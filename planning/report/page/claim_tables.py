@@ -8,7 +8,7 @@ from planning.model.document.certificates import Certificate
 from planning.model.document.coverage_records import ProjectorMarginal
 from planning.model.plan import RigPlan
 from planning.model.words import area_words, percent
-from planning.report.summary.coverage_lines import area_rows, reach_asked
+from planning.report.summary.coverage_lines import area_rows, reach_asked, share_cell
 from planning.report.summary.devices.station_lines import STATIONS
 from planning.report.summary.region_lines import region_place
 
@@ -48,9 +48,10 @@ def _coverage(plan: RigPlan) -> str:
             *(
                 cell
                 for areas in (target, surface)
+                for area in (getattr(areas, key),)
                 for cell in (
-                    area_words(getattr(areas, key)),
-                    _ratio(getattr(areas, key), areas.area_m2, reach_asked(plan, key)),
+                    area_words(area),
+                    share_cell(area, areas.area_m2, reach_asked(plan, key)),
                 )
             ),
         ]
@@ -68,7 +69,7 @@ def _coverage(plan: RigPlan) -> str:
         ),
     ):
         cells = [
-            _ratio(getattr(areas, part), getattr(areas, whole), least)
+            share_cell(getattr(areas, part), getattr(areas, whole), least)
             for areas in (target, surface)
         ]
         rows.append([label, "", cells[0], "", cells[1]])
@@ -82,7 +83,7 @@ def _causes(plan: RigPlan) -> str:
     whole = plan.coverage.target.area_m2
     ranked = sorted(plan.coverage.uncovered_by_cause.items(), key=lambda row: -row[1])
     rows = [
-        [cause, CAUSE_WORDS.get(cause, ""), area_words(area), _ratio(area, whole)]
+        [cause, CAUSE_WORDS.get(cause, ""), area_words(area), share_cell(area, whole)]
         for cause, area in ranked
         if area > 0.0
     ]
@@ -149,10 +150,10 @@ def _regions(plan: RigPlan) -> str:
         shares, by, floor = ["", "", "", ""], "", ""
         if areas is not None and areas.samples:
             shares = [
-                _ratio(areas.reachable_by_projectors_m2, region.area_m2),
-                _ratio(areas.lit_m2, areas.reachable_by_projectors_m2, asked),
-                _ratio(areas.reachable_by_cameras_m2, areas.lit_m2),
-                _ratio(areas.measured_m2, areas.reachable_by_cameras_m2, asked),
+                share_cell(areas.reachable_by_projectors_m2, region.area_m2),
+                share_cell(areas.lit_m2, areas.reachable_by_projectors_m2, asked),
+                share_cell(areas.reachable_by_cameras_m2, areas.lit_m2),
+                share_cell(areas.measured_m2, areas.reachable_by_cameras_m2, asked),
             ]
             by = " ".join((*region.lit_by, *areas.measured_by))
             floor = areas.floor or "none"
@@ -176,8 +177,8 @@ def _marginal(plan: RigPlan) -> Iterator[str]:
             lit.append(
                 [
                     _planned(row.n_projectors, len(plan.projectors)),
-                    _ratio(row.lit_target_m2, target),
-                    _ratio(row.lit_surface_m2, surface),
+                    share_cell(row.lit_target_m2, target),
+                    share_cell(row.lit_surface_m2, surface),
                     "" if worst is None else str(worst),
                     "" if share is None else percent(share, asked=floor),
                 ]
@@ -186,8 +187,8 @@ def _marginal(plan: RigPlan) -> Iterator[str]:
             measured.append(
                 [
                     _planned(row.n_cameras, len(plan.cameras)),
-                    _ratio(row.measured_target_m2, target),
-                    _ratio(row.measured_surface_m2, surface),
+                    share_cell(row.measured_target_m2, target),
+                    share_cell(row.measured_surface_m2, surface),
                 ]
             )
     head = ("projectors", "target lit", "surface lit", "worst region", "lit of it")
@@ -243,7 +244,3 @@ def _cost(plan: RigPlan) -> str:
         if value is not None:
             rows.append([words, f"{value:.4g} s"])
     return table("Cost", ("term", "value"), rows)
-
-
-def _ratio(part: float, whole: float, asked: float = 0.0) -> str:
-    return percent(part / whole, asked=asked) if whole > 0.0 else "undefined"

@@ -11,7 +11,7 @@ import numpy as np
 
 from geometry.poses import horizontal_axes
 from planning.model.plan import RigPlan
-from planning.model.words import count_words, percent
+from planning.model.words import count_words, share_words
 from planning.report.tolerance.joint_lines import joint_words
 from planning.report.tolerance.robust_lines import robust_cost
 from planning.report.tolerance.survival_lines import by_several_pairs, losses_words
@@ -146,18 +146,18 @@ def _devices(plan: RigPlan, room: int) -> list[str]:
 def _measured(plan: RigPlan) -> Iterator[Block]:
     areas, asked = plan.coverage.target, plan.requirements
     sigma, limit = plan.coverage.sigma, asked.triangulation.max_sigma_m
-    lit = _share(
+    lit = share_words(
         areas.lit_m2, areas.reachable_by_projectors_m2, asked.dominant_coverage
     )
-    seen = _share(areas.measured_m2, areas.reachable_by_cameras_m2, asked.coverage)
+    seen = share_words(areas.measured_m2, areas.reachable_by_cameras_m2, asked.coverage)
     if several := by_several_pairs(plan):
         seen = f"{seen} by one pair, {several}"
     first = f"lit {lit} ({100 * asked.dominant_coverage:g} asked) and measured"
     if plan.cameras_alone:
         first = f"by pairs, {asked.min_views} cameras or more seeing it, measured"
     text = (
-        f"{_share(areas.measured_m2, areas.area_m2)} of the target; of what can be, "
-        f"{first} {seen} ({100 * asked.coverage:g})"
+        f"{share_words(areas.measured_m2, areas.area_m2)} of the target; of what can "
+        f"be, {first} {seen} ({100 * asked.coverage:g})"
     )
     yield "MEASURED", text, 2
     if sigma is None:
@@ -259,7 +259,3 @@ def _end(plan: RigPlan, files: Sequence[str]) -> Iterator[Block]:
         f"{folder}` checks it again",
         2,
     )
-
-
-def _share(part: float, whole: float, asked: float = 0.0) -> str:
-    return percent(part / whole, asked=asked) if whole > 0.0 else "none"

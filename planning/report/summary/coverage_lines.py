@@ -1,12 +1,13 @@
 """What a plan lights and measures, and what one device more would, for a person."""
 
 import math
+from functools import partial
 
 from planning.model.devices.calibration_errors import CalibrationErrors
 from planning.model.document.coverage_records import CameraMarginal, ProjectorMarginal
 from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
-from planning.model.words import area_words, labelled, percent
+from planning.model.words import area_words, labelled, percent, share_words
 from planning.report.advice.least_changes import ANY_SETTING
 
 from .cause_words import causes_line
@@ -22,6 +23,7 @@ AREA_ROWS = {
     "reachable by cameras": "reachable_by_cameras_m2",
     "measured": "measured_m2",
 }
+share_cell = partial(share_words, of_nothing="undefined")
 
 
 def area_rows(plan: RigPlan) -> dict[str, str]:
@@ -48,10 +50,10 @@ def coverage_lines(plan: RigPlan) -> list[str]:
         # One surface: that it was sampled twice is no news.
         columns = {"whole surface": target}
     required = plan.requirements
-    lit = _ratio(
+    lit = share_cell(
         *(target.lit_m2, target.reachable_by_projectors_m2), required.dominant_coverage
     )
-    measured = _ratio(
+    measured = share_cell(
         *(target.measured_m2, target.reachable_by_cameras_m2), required.coverage
     )
     table = [f"{'':<25}{''.join(f'{title:>24}' for title in columns)}"]
@@ -225,10 +227,6 @@ def area_cell(area_m2: float, whole_m2: float, asked: float = 0.0) -> str:
     small = whole_m2 < _SMALL_M2
     area, unit = (1e6 * area_m2, "mm²") if small else (1e4 * area_m2, "cm²")
     return f"{area:9.1f} {unit} {percent(area_m2 / whole_m2, asked=asked):>8}"
-
-
-def _ratio(part: float, whole: float, asked: float) -> str:
-    return percent(part / whole, asked=asked) if whole > 0 else "undefined"
 
 
 def marginal_lines(plan: RigPlan) -> list[str]:

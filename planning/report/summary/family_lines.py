@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from planning.model.document.family_records import FamilyCount, MemberBound
 from planning.model.document.plan_document import MemberRecord
 from planning.model.plan import RigPlan
-from planning.model.words import count_words, percent
+from planning.model.words import count_words, share_words
 
 _HEAD = (
     *("member", "lit", "measured", "of the target", "sigma, 95 % [mm]"),
@@ -113,7 +113,7 @@ def _shares(member: RigPlan) -> Iterator[str]:
         (areas.measured_m2, areas.reachable_by_cameras_m2, required.coverage),
         (areas.measured_m2, areas.area_m2, 0.0),
     ):
-        yield percent(part / whole, asked=asked) if whole > 0.0 else "none"
+        yield share_words(part, whole, asked)
 
 
 def _exact(record: MemberRecord) -> tuple[str, str]:

@@ -71,9 +71,8 @@ def by_several_pairs(plan: RigPlan) -> str:
     record, asked = plan.document.survival, plan.requirements.survival
     if record is None or asked is None or asked.views == 1:
         return ""
-    share = next(measured_share(loss) for loss in record.losses if not loss.lost)
-    told = percent(share, asked=plan.requirements.coverage)
-    return f"{told} by {pairs_words(asked.views)}"
+    whole = next(loss for loss in record.losses if not loss.lost)
+    return f"{measured_words(plan, whole)} by {pairs_words(asked.views)}"
 
 
 def proof_words(kind: str, count: SurvivingCountRecord) -> str:
