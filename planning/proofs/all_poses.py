@@ -20,8 +20,8 @@ _STATUS: dict[CellStatus, Literal["proved", "survived", "cut"]] = {
     CellStatus.CUT: "cut",
 }
 
-# Share of the work for a search that leaves floors of regions out, where there are any.
-_WITHOUT_FLOORS = 0.8
+# Work for a search with floors of regions, as a share of that without.
+_WITH_FLOORS = 0.25
 
 
 @dataclass(frozen=True)
@@ -120,14 +120,15 @@ class BoundQuestion:
     ) -> CellBound:
         """Return what a search over cells of poses proves.
 
-        What is required of all alone comes first: what it proves holds with floors.
+        What is required of all alone comes first: what it proves holds with floors,
+        which are asked for where the known poses leave no room for a proof without.
         What some poses cover of the tree's samples, (k, n_rows), guides the search.
         """
         required = np.array([float(self.required)])
         problem = CellProblem(np.ones(tree.n_rows), required)
-        first = budget * (_WITHOUT_FLOORS if any(self.floors) else 1.0)
-        bound = bound_count(problem, tree, self.count, known=known, budget=first)
-        if bound.status is CellStatus.PROVED or not any(self.floors):
+        bound = bound_count(problem, tree, self.count, known=known, budget=budget)
+        room = known is not None and bound.over_known > self.count - 1
+        if bound.status is CellStatus.PROVED or room or not any(self.floors):
             return bound
         floored = CellProblem(
             np.ones(tree.n_rows),
@@ -142,7 +143,7 @@ class BoundQuestion:
             self.count,
             known=known,
             least=int(bound.lower_bound),
-            budget=budget - first,
+            budget=_WITH_FLOORS * budget,
         )
         return again if again.lower_bound > bound.lower_bound else bound
 

@@ -127,7 +127,9 @@ class _Proof:
     ) -> None:
         self.problem, self.tree, self.count, self.budget = problem, tree, count, budget
         self.whole = whole_rows(problem)
-        share = budget.part(_MULTIPLIERS_SHARE * budget.units)
+        few = count - 1 <= _MOST_CELLS
+        multipliers = _MULTIPLIERS_SHARE if few else 1.0 - _BRIEFLY
+        share = budget.part(multipliers * budget.units)
         # Cells that are made count in both.
         self.store = CellStore(tree, share)
         rows = None if known is None else pack_rows(known)
