@@ -98,6 +98,11 @@ class CandidateSet:
         """Which pose lights which sample, shape (n, k)."""
         return self.stages == projector_limits.LIT
 
+    @property
+    def unshadowed(self) -> NDArray[np.bool_]:
+        """Which pose would light which sample without the mesh's shadows, (n, k)."""
+        return self.lit | (self.stages == projector_limits.OCCLUDED)
+
     @cached_property
     def reached(self) -> NDArray[np.bool_]:
         """Which samples any pose lights, shape (n,)."""

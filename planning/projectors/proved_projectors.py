@@ -138,6 +138,7 @@ def bound_of(
         question,
         effort,
         stage.candidates.lit[wanted].T,
+        stage.candidates.unshadowed[wanted].T,
     )
 
 

@@ -116,19 +116,34 @@ class BoundQuestion:
         )
 
     def searched(
-        self, tree: CellTree, budget: float, known: NDArray[np.bool_] | None = None
+        self,
+        tree: CellTree,
+        budget: float,
+        known: NDArray[np.bool_] | None = None,
+        *,
+        all_or_nothing: bool = False,
     ) -> CellBound:
         """Return what a search over cells of poses proves.
 
         What is required of all alone comes first: what it proves holds with floors,
         which are asked for where the known poses leave no room for a proof without.
-        What some poses cover of the tree's samples, (k, n_rows), guides the search.
+        What some poses cover of the tree's samples, (k, n_rows), guides the search;
+        where they show that multipliers can't prove the count, all or nothing ends, and
+        floors aren't asked for.
         """
         required = np.array([float(self.required)])
         problem = CellProblem(np.ones(tree.n_rows), required)
-        bound = bound_count(problem, tree, self.count, known=known, budget=budget)
+        bound = bound_count(
+            problem,
+            tree,
+            self.count,
+            known=known,
+            budget=budget,
+            all_or_nothing=all_or_nothing,
+        )
         room = known is not None and bound.over_known > self.count - 1
-        if bound.status is CellStatus.PROVED or room or not any(self.floors):
+        proved = bound.status is CellStatus.PROVED
+        if proved or room or all_or_nothing or not any(self.floors):
             return bound
         floored = CellProblem(
             np.ones(tree.n_rows),

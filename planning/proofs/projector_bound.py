@@ -64,6 +64,7 @@ def bound_projectors(
     question: BoundQuestion,
     effort: Effort,
     known: NDArray[np.bool_] | None = None,
+    unshadowed: NDArray[np.bool_] | None = None,
 ) -> ContinuousBound:
     """Bound the projectors over every pose of the workspace.
 
@@ -71,7 +72,9 @@ def bound_projectors(
     several models it is of the range that any has, and of any number of each.
 
     The samples are those that some candidate lights and no existing projector does;
-    which of them each candidate lights, (k, n), guides the search.
+    which of them each candidate lights, (k, n), guides the search, and which it would
+    light without shadows the search without; that is given up where such candidates
+    show that nothing is proved so.
     """
     if question.count <= 1:
         # What is required takes one, with shadows or without: no cell is looked at.
@@ -86,7 +89,13 @@ def bound_projectors(
     shadows = bool(len(samples) * len(scene.mesh.faces) <= effort.shadows)
     shadows = shadows and bool(depth >= reach)
 
-    def searched(effort: Effort, *, shadows: bool) -> tuple[CellBound, _Tree]:
+    def searched(
+        effort: Effort,
+        known: NDArray[np.bool_] | None,
+        *,
+        shadows: bool,
+        all_or_nothing: bool = False,
+    ) -> tuple[CellBound, _Tree]:
         cube = cube_map(1 << effort.maps)
         required = scene.requirements.projector
         limits = DirectionLimits(required.max_incidence, required.min_tangent_angle)
@@ -99,16 +108,21 @@ def bound_projectors(
         else:
             maps = WidenedMaps(opened, cube), WidenedMaps(~opened, cube)
             tree = _positions(scene, templates, samples, maps, effort.finest)
-        return question.searched(tree, effort.budget, known), tree
+        found = question.searched(
+            tree, effort.budget, known, all_or_nothing=all_or_nothing
+        )
+        return found, tree
 
     # Shadows cost most, and what is proved without them holds with them.
     first = effort
     if shadows:
         maps, finest = max(0, effort.maps - 1), min(effort.finest, _FIRST_FINEST)
         first = replace(effort, maps=maps, finest=finest, budget=_FIRST * effort.budget)
-    bound, tree = searched(first, shadows=False)
+    given_up = shadows and unshadowed is not None
+    plain = known if unshadowed is None else unshadowed
+    bound, tree = searched(first, plain, shadows=False, all_or_nothing=given_up)
     if shadows and bound.status is not CellStatus.PROVED:
-        among = searched(effort, shadows=True)
+        among = searched(effort, known, shadows=True)
         finer = replace(
             effort,
             maps=effort.maps + 1,
@@ -117,7 +131,7 @@ def bound_projectors(
         )
         bits = cube_map(1 << finer.maps).size * len(samples)
         if finer.budget and bits <= 8.0 * _MAP_BYTES and _leaves_room(among[0]):
-            among = max(among, searched(finer, shadows=True), key=_proved)
+            among = max(among, searched(finer, known, shadows=True), key=_proved)
         # Cut short, a longer search may have proved less.
         if shadows := among[0].lower_bound >= bound.lower_bound:
             bound, tree = among

@@ -88,6 +88,7 @@ def bound_count(
     least: int = 0,
     budget: float = DEFAULT_BUDGET,
     time_limit: float = float("inf"),
+    all_or_nothing: bool = False,
 ) -> CellBound:
     """Prove that fewer than ``count`` poses can't be enough, or as much as holds.
 
@@ -100,6 +101,8 @@ def bound_count(
         least: Poses that were proved to be needed: no fewer are looked at.
         budget: Counted work, about 1e9 a second.
         time_limit: Wall time that cuts the work, in [s]; the proof then says so.
+        all_or_nothing: Whether to end at once where multipliers can't prove the count,
+            since fewer known poses may be enough.
 
     Raises:
         ValueError: If the count isn't a whole number of at least 1, the tree has other
@@ -112,7 +115,8 @@ def bound_count(
             f"{problem.weights.size}"
         )
     limit = WorkBudget(budget, time_limit=time_limit)
-    return _Proof(problem, tree, count, limit, known, least).run()
+    proof = _Proof(problem, tree, count, limit, known, least)
+    return proof.run(all_or_nothing=all_or_nothing)
 
 
 class _Proof:
@@ -142,11 +146,14 @@ class _Proof:
         self.standing: NDArray[np.int64] | None = None
         self.seen = self.store.names
 
-    def run(self) -> CellBound:
+    def run(self, *, all_or_nothing: bool) -> CellBound:
         if not _reachable(self.whole, self.store):
             proof = "all cells together serve less than is required"
             return self._answer(CellStatus.INFEASIBLE, float("inf"), proof)
         most = self.count - 1
+        if all_or_nothing and self.search.may_be_enough(most):
+            proof = f"{self.proof}; {most} known poses may be enough"
+            return self._answer(CellStatus.CUT, float(self.lower), proof)
         if most >= _LOOKED_FOR:
             self._look(most)
             most -= self.standing is not None

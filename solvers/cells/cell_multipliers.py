@@ -86,13 +86,15 @@ class MultiplierSearch:
 
     def refute_most(self, n_poses: int) -> None:
         """Refute at once so many poses, or as many as poses in hand leave room for."""
-        while self.bound <= n_poses:
-            self._prepare(n_poses)
-            proposal = self._proposed()
-            if proposal is None or not proposal.reached:
-                break
+        while self.bound <= n_poses and self.may_be_enough(n_poses):
             n_poses -= 1
         self.refute(n_poses)
+
+    def may_be_enough(self, n_poses: int) -> bool:
+        """Return whether so many poses in hand are, as far as multipliers know."""
+        self._prepare(n_poses)
+        proposal = self._proposed()
+        return proposal is not None and proposal.reached
 
     def refute(self, n_poses: int) -> bool:
         """Look for multipliers by which so many poses aren't enough."""

@@ -29,10 +29,10 @@ def least():
     template = make_projector(rig, np.array([0.1, 0.45]))
     rows = scene.target_samples(Draw(N, 3))
 
-    def bound(effort, count, known=None):
+    def bound(effort, count, known=None, unshadowed=None):
         asked = BoundQuestion(int(SHARE * N), count, N, 1e-6)
         given = (scene, (template,), rows, asked, effort)
-        return bound_projectors(*given, known).proof().lower_bound
+        return bound_projectors(*given, known, unshadowed).proof().lower_bound
 
     return bound
 
@@ -52,3 +52,9 @@ def test_none_are_asked_where_known_poses_may_nearly_be_enough(least, lit, prove
 def test_maps_that_would_be_too_large_arent_made(least, monkeypatch):
     monkeypatch.setattr(projector_bound, "_MAP_BYTES", 1e5)
     assert least(FINER, 3) == 1
+
+
+def test_poses_enough_without_shadows_leave_it_to_the_search_among_them(least):
+    """One pose that would light all shows that nothing is proved without shadows."""
+    every = np.ones((1, N), dtype=bool)
+    assert least(FINER, 3, None, every) == 2

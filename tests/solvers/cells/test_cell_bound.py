@@ -644,3 +644,21 @@ def test_threads_change_nothing(cap_trees, by_threads):
     np.testing.assert_array_equal(one.multipliers, two.multipliers)
     for name in ("lower_bound", "status", "cells_used", "proof"):
         assert getattr(one, name) == getattr(two, name)
+
+
+@pytest.mark.parametrize(("apart", "proved"), [(False, 0), (True, 2)])
+def test_all_or_nothing_asks_no_cell_where_a_known_pose_may_be_enough(apart, proved):
+    """More than half is wanted: a pose that serves both halves is enough alone."""
+    halves = np.repeat(np.eye(2, dtype=bool), 5, axis=1)
+    known = halves if apart else np.ones((1, 10), dtype=bool)
+    tree = tree_of_leaves(np.array([-1, 0, 0]), pack_rows(halves), 10)
+    bound = bound_count(
+        CellProblem(np.ones(10), np.array([6.0])),
+        tree,
+        2,
+        known=known,
+        budget=PLENTY,
+        all_or_nothing=True,
+    )
+    asked = bound.cells_used > 1
+    assert (bound.lower_bound, asked) == (proved, apart)
