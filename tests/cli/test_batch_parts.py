@@ -326,6 +326,17 @@ def test_a_file_that_a_rig_names_in_vain_is_one_line(tmp_path, begun):
     assert "is looked for beside it" in line
 
 
+def test_what_is_wrong_with_the_rig_is_told_before_any_part(tmp_path, begun):
+    made(tmp_path, "part.obj")
+    rig = tmp_path / "cell.toml"
+    for text, told in (("nonsense = 3", "`nonsense` is not a known key"), ("= 3", "")):
+        rig.write_text(text)
+        ended = run(tmp_path / "part.obj", "-o", tmp_path / "out", "--rig", rig)
+        assert (ended.exit_code, begun) == (3, [])
+        assert told in ended.stderr
+        assert not (tmp_path / "out").exists()
+
+
 @pytest.mark.parametrize("uri", ["../m%20x.bin", "{}/m x.bin"])
 def test_buffers_stay_in_the_temporary_folder(tmp_path, monkeypatch, reads, uri):
     made(tmp_path, "in/other.obj", "m x.bin")

@@ -15,6 +15,7 @@ from planning.cli.output_folder import exchanged
 from planning.model.errors import PlanningError
 from planning.model.progress import Report
 from planning.model.words import count_words
+from planning.rig.rig import load_rig
 
 from .index_page import NAME as INDEX
 from .index_page import write_index
@@ -169,6 +170,8 @@ def batch_command(
         given: Folders, patterns and files of the parts.
         words: Options of each part's own command line.
     """
+    # What is wrong with the rig is wrong with every part.
+    load_rig(options["rig_name"], options["light"])
     out = Path(options["output"])
     parts = {part.name: part for part in find_parts(given, out)}
     try:

@@ -46,7 +46,7 @@ def part_files(path: Path) -> dict[str, bytes]:
 
 
 def rig_files(name: str) -> dict[str, bytes]:
-    """Return a rig file with all files that it names; nothing of a preset.
+    """Return a rig file that can be read with all files it names; nothing of a preset.
 
     They are called as it names them, but for absolute paths: those get others, and
     stand so in the rig file that is returned.
@@ -57,13 +57,8 @@ def rig_files(name: str) -> dict[str, bytes]:
     if not (name.lower().endswith(".toml") or "/" in name or "\\" in name):
         return {}
     path = Path(name)
-    content = _content(path)
-    try:
-        text = content.decode()
-        names = tuple(dict.fromkeys(_named(tomllib.loads(text))))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError):
-        # Each part's own run says what is wrong with it.
-        return {path.name: content}
+    text = _content(path).decode()
+    names = tuple(dict.fromkeys(_named(tomllib.loads(text))))
     called = _called(names)
     text = _renamed(text, called)
     if {*_named(tomllib.loads(text))} != {*called.values()}:
