@@ -1,11 +1,13 @@
 """Samples of the audit: independent random draws, never the planner's."""
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from geometry.arrays import Array, Ints, Mask, rows_of
+from geometry.mesh.mesh import TriangleMesh
 from planning.model.errors import PlanFileError
 from planning.model.surface import Surface
 
@@ -59,7 +61,7 @@ def draw_samples(surface: Surface, target: str, n: int, seed: int) -> AuditSampl
     Raises:
         PlanFileError: If the target has no area.
     """
-    rng = np.random.default_rng((_STREAM, seed))
+    rng = _generator(surface, seed)
     inside = surface.target_faces(target)
     areas = surface.mesh.face_areas
     if not areas[inside].sum() > 0.0:
@@ -74,8 +76,29 @@ def draw_samples(surface: Surface, target: str, n: int, seed: int) -> AuditSampl
 
 def draw_region(surface: Surface, region: int, n: int, seed: int) -> AuditSamples:
     """Draw n points of a dominant region, as `draw_samples` does of a part."""
-    rng = np.random.default_rng((_STREAM, seed, 1 + region))
+    rng = _generator(surface, seed, 1 + region)
     return _draw(surface, surface.region == region, True, n, rng)
+
+
+def generator_of(arrays: Sequence[Array | Ints], *words: int) -> np.random.Generator:
+    """Return the random stream of some words, another one for any other arrays.
+
+    Whoever writes a plan knows its seed, and may put faces into an order in which draws
+    from that alone fall where he likes.
+    """
+    digest = hashlib.sha256()
+    for array in arrays:
+        digest.update(array.tobytes())
+    return np.random.default_rng((*words, int.from_bytes(digest.digest())))
+
+
+def draw_points(
+    mesh: TriangleMesh, areas: Array, n: int, rng: np.random.Generator
+) -> tuple[Array, Ints]:
+    """Draw n points (n, 3), and their faces, by the areas of faces, 0 of some."""
+    faces = rng.choice(len(areas), size=n, p=areas / areas.sum())
+    shares = rng.dirichlet((1.0, 1.0, 1.0), size=n)
+    return np.einsum("nk,nkd->nd", shares, mesh.corners[faces]), faces
 
 
 def samples_on(
@@ -106,13 +129,16 @@ def samples_at_centroids(surface: Surface, within: Mask) -> AuditSamples:
     return samples_on(surface, centroids, faces, every, areas[faces])
 
 
+def _generator(surface: Surface, *words: int) -> np.random.Generator:
+    region = np.asarray(surface.region, dtype=np.int64)
+    arrays = surface.mesh.vertices, surface.mesh.faces, region
+    return generator_of(arrays, _STREAM, *words)
+
+
 def _draw(
     surface: Surface, within: Mask, in_target: bool, n: int, rng: np.random.Generator
 ) -> AuditSamples:
     areas = np.where(within, surface.mesh.face_areas, 0.0)
-    total = float(areas.sum())
-    faces = rng.choice(len(areas), size=n, p=areas / total)
-    shares = rng.dirichlet((1.0, 1.0, 1.0), size=n)
-    points = np.einsum("nk,nkd->nd", shares, surface.mesh.corners[faces])
-    inside, weights = np.full(n, in_target), np.full(n, total / n)
+    points, faces = draw_points(surface.mesh, areas, n, rng)
+    inside, weights = np.full(n, in_target), np.full(n, float(areas.sum()) / n)
     return samples_on(surface, points, faces, inside, weights)
