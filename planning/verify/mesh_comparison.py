@@ -3,14 +3,14 @@
 import numpy as np
 
 from geometry.mesh.mesh import TriangleMesh
-from geometry.mesh.sampling import sample_surface
 from geometry.rays.proximity import closest_points
 from planning.model.plan import RigPlan
 
 from .audit.audit_findings import AuditFindings
+from .audit.audit_samples import draw_points, generator_of
 
 _MM = 1e3
-_MESH_SAMPLES = 2000
+_MESH_SAMPLES = 10_000
 # A mesh that is larger or smaller by more than this is another file or unit.
 _MOST_RESIZED = 1.5
 # Of two normals that look the other way, minus their product; and how much may: of
@@ -23,7 +23,8 @@ def compare_meshes(mesh: TriangleMesh, surface: TriangleMesh, seed: int) -> list
 
     Random points of either must lie on the other within 1e-4 of its radius, on faces
     that look the same way, and the areas agree to 1e-3: the same shape, though it be
-    differently repaired or triangulated.
+    differently repaired or triangulated. Both meshes decide where the points lie, so
+    that no surface can be made to differ only beside them.
     """
     slack = 1e-4 * surface.radius
     if not np.allclose(mesh.bounds, surface.bounds, rtol=0.0, atol=slack):
@@ -87,8 +88,10 @@ def _beside(mesh: TriangleMesh, other: TriangleMesh, seed: int) -> tuple[float, 
 
     Their largest distance [m], and the share on faces that look the other way.
     """
-    samples = sample_surface(mesh, _MESH_SAMPLES, seed=seed)
-    nearest = closest_points(other, samples.points)
-    normals = other.face_normals[nearest.faces]
-    along = np.einsum("ij,ij->i", samples.normals, normals)
+    both = mesh.vertices, mesh.faces, other.vertices, other.faces
+    rng = generator_of(both, seed)
+    points, faces = draw_points(mesh, mesh.face_areas, _MESH_SAMPLES, rng)
+    nearest = closest_points(other, points)
+    normals = mesh.face_normals[faces], other.face_normals[nearest.faces]
+    along = np.einsum("ij,ij->i", *normals)
     return float(np.abs(nearest.distances).max()), float((along < -_OPPOSITE).mean())

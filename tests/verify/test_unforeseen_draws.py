@@ -3,11 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
-from support.plain_shapes import grid
+from support.plain_shapes import box, grid
 
 from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.sampling import sample_surface
 from planning.model.surface import Surface
 from planning.verify.audit.audit_samples import draw_samples
+from planning.verify.mesh_comparison import compare_meshes
 
 
 def in_order(surface: Surface, order: np.ndarray) -> Surface:
@@ -18,6 +20,17 @@ def in_order(surface: Surface, order: np.ndarray) -> Surface:
         **{name: getattr(surface, name)[order] for name in ("member", "region")},
         steep=surface.steep[order],
     )
+
+
+def test_a_surface_that_differs_beside_known_draws_is_another_shape():
+    """All of a box but the fifth of its faces that 2000 even draws of the seed meet."""
+    mesh = box((1.0, 1.0, 1.0), divisions=30)
+    kept = np.isin(np.arange(len(mesh.faces)), sample_surface(mesh, 2000, seed=0).faces)
+    sunk = np.where(kept, 0.0, 0.01)[:, None, None] * mesh.face_normals[:, None]
+    corners = (mesh.corners - sunk).reshape(-1, 3)
+    other = TriangleMesh(corners, np.arange(len(corners)).reshape(-1, 3))
+    (why,) = compare_meshes(mesh, other, 0)
+    assert "another shape" in why
 
 
 def test_faces_in_an_order_made_for_the_draws_are_drawn_otherwise(handmade):
