@@ -115,7 +115,11 @@ UNAUDITED_OF_CHECK = {
 }
 # By what faces are chosen that no user chose.
 _FOUND = {"curvature": "curvature", "outside": "what lies outside"}
-# Of the mesh file, which isn't part of the plan.
+# Of files that aren't part of the plan: what was planned with, and what for.
+_OF_RIG = (
+    "the rig's file, which has devices, noise, limits, workspace and obstacles (rig): "
+    "compare it, or give --replan --rig FILE"
+)
 _OF_FILE = "the mesh file, its digest, size and repairs (meshes): give --mesh {path}"
 
 
@@ -178,22 +182,33 @@ def taken_on_trust(
         )
     if plan.document.request is None:
         lines.append("what was asked: the plan has no request beside its requirements")
-    record = plan.document.meshes[0]
+    return (*lines, _OF_RIG, *_of_mesh(plan, mesh))
+
+
+def _of_mesh(plan: RigPlan, mesh: TriangleMesh | None) -> tuple[str, ...]:
+    """Return what of the mesh file was believed, a line each."""
+    record, planned = plan.document.meshes[0], plan.surface.mesh
     if mesh is None:
-        path = record.path or "FILE"
-        lines.append(_OF_FILE.format(path=path))
-    elif mesh.source is None or mesh.source.sha256 != record.sha256:
-        lines.append(
+        return (_OF_FILE.format(path=record.path or "FILE"),)
+    x, y, z = 1e3 * np.ptp(mesh.bounds, axis=0)
+    unit = (
+        f"the unit of the mesh file, {record.unit} by the plan, in which it is "
+        f"{x:.4g} x {y:.4g} x {z:.4g} mm"
+    )
+    if mesh.source is None or mesh.source.sha256 != record.sha256:
+        return (
             "the mesh file that was planned (meshes): the one given has the same shape "
-            "and other bytes"
+            "and other bytes",
+            unit,
         )
-    if mesh is not None:
-        x, y, z = 1e3 * np.ptp(mesh.bounds, axis=0)
-        lines.append(
-            f"the unit of the mesh file, {record.unit} by the plan, in which it is "
-            f"{x:.4g} x {y:.4g} x {z:.4g} mm"
-        )
-    return tuple(lines)
+    same = mesh.faces.shape == planned.faces.shape
+    if same and np.allclose(mesh.corners, planned.corners, 0.0, 1e-9 * mesh.radius):
+        return (unit,)
+    return (
+        "how the surface is cut into triangles, along which samples of bounds lie "
+        "(faces in surface.npz): the mesh file's are others",
+        unit,
+    )
 
 
 def held_against_others(

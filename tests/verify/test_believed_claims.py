@@ -1,10 +1,12 @@
 """What of a check is believed: failures by its figures alone, the rest by name."""
 
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 
+from geometry.mesh.mesh import TriangleMesh
 from planning.model.document.check_records import ReconstructionRecord
 from planning.model.requirements import CheckLimits
 from planning.verify import verification
@@ -115,6 +117,22 @@ def test_what_no_audit_recomputes_is_named_unless_it_came_out_again(checked, key
     assert key in named(checked, "", EXACTLY)
     assert key not in named(checked, EXACTLY, APART)
     assert key not in named(checked, WHOLLY, APART)
+
+
+@pytest.mark.parametrize("held", ["", APART, EXACTLY, WHOLLY])
+def test_the_rig_is_the_plans_own_unless_all_was_planned_again(checked, held):
+    assert ("--rig FILE" in named(checked, held, EXACTLY)) is (held != WHOLLY)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_triangles_that_a_mesh_file_has_otherwise_are_told(checked, turned):
+    """Samples lie along them: in another order they are others."""
+    mesh = checked.surface.mesh
+    source = SimpleNamespace(sha256=checked.document.meshes[0].sha256)
+    faces = mesh.faces[::-1] if turned else mesh.faces
+    given = replace(TriangleMesh(mesh.vertices, faces), source=source)
+    told = "\n".join(taken_on_trust(checked, given, EXACTLY, EXACTLY))
+    assert ("cut into triangles" in told) is turned
 
 
 def test_what_only_a_check_again_gives_is_named_likewise(checked):
