@@ -181,8 +181,8 @@ class RigPlan:
         return cls(read, surface)
 
     @classmethod
-    def load(cls, path: str | Path) -> Self:
-        """Read a plan and the surface beside it.
+    def load(cls, path: str | Path, *, of_family: bool = False) -> Self:
+        """Read a plan and the surface beside it; a member `of_family` is no family.
 
         Raises:
             PlanFileError: If a file is missing, isn't a plan of a version that is
@@ -192,6 +192,9 @@ class RigPlan:
         with reading(path, PlanFileError):
             content = file_content(path)
         document = _document(content, str(path))
+        # Before its own members are read, which may lead back here.
+        if of_family and document.family is not None:
+            raise PlanFileError(f"{path}: a member is a family itself; plan again")
         surface = document.surface
         loaded = Surface.load(path.parent / surface.path, surface.sha256)
         _check_references(document, loaded, str(path))
@@ -211,10 +214,7 @@ class RigPlan:
                     f"{path}: member {record.name!r} lies in {record.path!r}, must be "
                     f"{member_path(record.name)!r}; plan again"
                 )
-            member = cls.load(path.parent / record.path)
-            if member.members:
-                raise PlanFileError(f"{path}: a member is a family itself; plan again")
-            members.append(member)
+            members.append(cls.load(path.parent / record.path, of_family=True))
         return tuple(members)
 
 

@@ -64,14 +64,45 @@ def edited(plan, place, value):
         ("surface.curvature_radius_m", -0.01, "greater than or equal to 0"),
         ("version", True, "version True, this program reads 1"),
         ("version", 1.0, "version 1.0, this program reads 1"),
-        ("surface.path", "a\0b", "must hold no control character"),
-        ("surface.path", "a\nplan: fine", "must hold no control character"),
+        ("members.0.path", "a\0b", "must hold no control character"),
+        ("members.0.path", "a\nplan: fine", "must hold no control character"),
+        ("surface.path", "../surface.npz", "should be 'surface.npz'"),
+        ("surface.path", "/etc/passwd", "should be 'surface.npz'"),
+        ("members.0.name", "..", "must be the name of a folder"),
+        ("members.0.name", "../../head", "must be the name of a folder"),
+        ("members.0.name", "a\\b", "must be the name of a folder"),
     ],
 )
 def test_what_none_can_compute_with_is_refused_in_a_line(
     plan, folder, tmp_path, place, value, fault
 ):
     assert fault in refused(folder, tmp_path, edited(plan, place, value))
+
+
+def test_a_family_among_its_own_members_is_refused_when_it_is_met(
+    plan, handmade, tmp_path
+):
+    """Its folder leads back to it, as a link does: it would be read 2^40 times."""
+    bound = {"member": 0, "count": 1, "lower_bound": 1}
+    count = {"count": 1, "needed": 1, "lower_bound": 1, "n_candidates": 1}
+    count |= {"n_samples": 1, "proof": "", "hardest": bound}
+    family = {"align": "given", "quantile": 1.0, "n_asked": 2, "worst": 0}
+    family |= {"projectors": count, "cameras": count}
+
+    def of_itself(document):
+        (member,) = document["members"]
+        named = {name: f"members/{name}/plan.json" for name in ("a", "b")}
+        document["members"] = [
+            member | {"name": name, "path": path} for name, path in named.items()
+        ]
+        document["family"] = family
+
+    handmade.save(handmade.tampered(plan, of_itself), tmp_path)
+    (tmp_path / "members").mkdir()
+    for name in ("a", "b"):
+        (tmp_path / "members" / name).symlink_to(tmp_path, target_is_directory=True)
+    with pytest.raises(PlanFileError, match=r"a/plan\.json: a member is a family"):
+        RigPlan.load(tmp_path / "plan.json")
 
 
 ZONE = {"name": "press", "centre_mm": [0, 0, 0], "turn_deg": [0, 0, 0]}

@@ -12,7 +12,7 @@ from planning.model.devices.lens_fault import lens_fault
 from planning.model.devices.stated_tables import STATED_TABLES, check_stated
 
 from .head_records import CarrierRecord, HeadRecord, TurntableRecord
-from .part import Count, FileName, Interval, Matrix3, Part, Resolution, Size, Vector3
+from .part import Count, Interval, Matrix3, Part, Resolution, Size, Vector3
 
 
 class Units(Part):
@@ -70,9 +70,9 @@ class SelectionRecord(Part):
 
 
 class SurfaceRecord(Part):
-    """The file of the surface as planned."""
+    """The file of the surface as planned, beside the plan and nowhere else."""
 
-    path: FileName
+    path: Literal["surface.npz"]
     sha256: str
     curvature_radius_m: Size
     dominant_share: Size

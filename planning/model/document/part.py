@@ -28,8 +28,16 @@ def _is_printable(text: str) -> str:
     return text
 
 
+def _is_folder(text: str) -> str:
+    if {"/", "\\"} & set(text) or text in (".", ".."):
+        raise ValueError("must be the name of a folder")
+    return text
+
+
 # Of a file beside the plan; what errors say of it stays one line.
 FileName = Annotated[str, AfterValidator(_is_printable)]
+# Of a folder; none leads out of the one that it is in.
+FolderName = Annotated[str, AfterValidator(_is_folder)]
 
 
 class Part(BaseModel):

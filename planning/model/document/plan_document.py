@@ -34,7 +34,7 @@ from .input_records import (
 )
 from .joint_records import JointRecord
 from .made_with import MadeWith
-from .part import FileName, Part
+from .part import FileName, FolderName, Part
 from .request_records import RequestRecord
 from .ring_records import RingAxes
 from .station_records import StationsRecord
@@ -86,7 +86,7 @@ class MemberRecord(Part):
     coverage: Coverage
     regions: tuple[int, ...]
     reconstruction: ReconstructionRecord | None = None
-    name: str = ""
+    name: FolderName = ""
     path: FileName = ""
     digest: str = ""
     alignment: AlignmentRecord | None = None
