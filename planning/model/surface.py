@@ -166,7 +166,7 @@ class Surface:
             wanted |= {n: of for n, of in sometimes.items() if n in packed}
             if lacking := wanted.keys() - packed.keys():
                 raise PlanFileError(f"{min(lacking)} is missing; plan again")
-            arrays: dict[str, Any] = {name: packed[name] for name in wanted}
+            arrays: dict[str, Any] = {name: _plain(packed[name]) for name in wanted}
             solids = (*_OBSTACLES, *_STATIONS)
             apart = ("vertices", "faces", *solids)
             _check_arrays({name: arrays[name] for name in apart if name in arrays}, {})
@@ -175,6 +175,12 @@ class Surface:
             return cls(mesh, **arrays, obstacles=obstacles)
         except (MeshError, PlanFileError) as error:
             raise PlanFileError(f"{path}: {error}") from None
+
+
+def _plain(array: NDArray[Any]) -> NDArray[Any]:
+    """Return narrower floats, or those of another machine, as ours; others as it is."""
+    floats = array.dtype.kind == "f" and np.can_cast(array.dtype, np.float64)
+    return array.astype(np.float64, copy=False) if floats else array
 
 
 def _check_arrays(
@@ -187,6 +193,8 @@ def _check_arrays(
             want in ("n", has) for want, has in zip(wanted, array.shape, strict=True)
         )
         fits &= array.dtype.kind in kinds
+        # Wider floats are none that linear algebra takes.
+        fits &= kinds != "f" or np.can_cast(array.dtype, np.float64)
         if not fits or (kinds == "f" and not np.all(np.abs(array) < _LARGEST)):
             floats = f"floats of less than {_LARGEST:g}"
             number = {"f": floats, "iu": "integers", "U": "names"}[kinds]

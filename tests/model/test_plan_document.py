@@ -125,6 +125,13 @@ def _rewritten(folder, **changes):
         ("member", np.array(3)),
         ("steep", np.zeros((4, 3), dtype=complex)),
         ("reference_cameras", np.zeros((2, 4))),
+        pytest.param(
+            "reference_cameras",
+            np.tile(np.eye(4, dtype=np.longdouble), (4, 1, 1)),
+            marks=pytest.mark.skipif(
+                np.can_cast(np.longdouble, float), reason="no wider floats here"
+            ),
+        ),
         ("faces", np.zeros((2, 3))),
     ],
 )
@@ -135,6 +142,16 @@ def test_arrays_of_another_kind_or_shape_are_refused(
     path = _rewritten(tmp_path, **{name: array})
     with pytest.raises(PlanFileError, match=rf"`{name}` must be .*, got .* of shape"):
         RigPlan.load(path)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("kind", ["float16", "float32", ">f8"])
+def test_narrower_floats_are_read_as_ours(handmade, plan, tmp_path, kind):
+    handmade.save(plan, tmp_path)
+    poses = plan.surface.reference_cameras.astype(kind)
+    read = RigPlan.load(_rewritten(tmp_path, reference_cameras=poses)).surface
+    assert read.reference_cameras.dtype == np.float64
+    assert np.array_equal(read.reference_cameras, poses)
 
 
 def test_a_surface_that_was_damaged_is_refused(handmade, plan, tmp_path):
