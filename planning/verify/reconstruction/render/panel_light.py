@@ -7,6 +7,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.special import ndtr
 
+from geometry.arrays import rows_of
 from planning.verify.reconstruction.arrays import Array, Grey, Indices
 from planning.verify.reconstruction.patterns.panel import PanelWindow
 
@@ -33,10 +34,10 @@ class PanelLight:
         """The pixels whose light may fall on some place, and at least one."""
         if not len(self.pixels):
             return PanelWindow(0, 0, 2, 2)
-        reach = _halves(self.spread)[:, None] + 1
-        middle = np.rint(self.pixels).astype(np.int64)
-        left, top = (middle - reach).min(axis=0).tolist()
-        right, bottom = (middle + reach).max(axis=0).tolist()
+        reach = _halves(self.spread) + 1
+        u, v = np.rint(self.pixels).T.astype(np.int64)
+        left, top = (int((at - reach).min()) for at in (u, v))
+        right, bottom = (int((at + reach).max()) for at in (u, v))
         return PanelWindow(left, top, right - left + 1, bottom - top + 1)
 
     def gathered(self, images: Grey, window: PanelWindow) -> Grey:
@@ -59,18 +60,19 @@ class PanelLight:
 
     def _taps(self, rows: Indices, half: int, window: PanelWindow) -> csr_array:
         """Weights of so many pixels to either side, shape (n_rows, n_pixels)."""
-        middle = np.rint(self.pixels[rows])
-        away, spread = middle - self.pixels[rows], self.spread[rows]
-        borders = np.arange(-half, half + 2) - 0.5
+        pixels, spread = rows_of(self.pixels, rows).T, rows_of(self.spread, rows).T
+        middle = np.rint(pixels)
+        borders = np.arange(-half, half + 2)[:, None] - 0.5
+        # Pixel by pixel for all places: rows of a few numbers take numpy longer.
         across, down = (
-            _normal(np.diff(ndtr((borders + away[:, k, None]) / spread[:, k, None])))
-            for k in (0, 1)
+            _normal(np.diff(ndtr((borders + away) / wide), axis=0))
+            for away, wide in zip(middle - pixels, spread, strict=True)
         )
-        u, v = (middle - np.array([window.left, window.top])).astype(np.int32).T
+        u, v = (middle - np.array([[window.left], [window.top]])).astype(np.int32)
         steps = np.arange(-half, half + 1, dtype=np.int32)
         near = (steps[:, None] * np.int32(window.width) + steps).ravel()
         first = v * np.int32(window.width) + u
-        weights = (down[:, :, None] * across[:, None, :]).reshape(-1)
+        weights = (down[:, None] * across).reshape(len(near), -1).T.ravel()
         ends = np.arange(len(rows) + 1, dtype=np.int32) * np.int32(len(near))
         shape = len(rows), window.width * window.height
         return csr_array((weights, (first[:, None] + near).ravel(), ends), shape=shape)
@@ -78,7 +80,7 @@ class PanelLight:
 
 def _halves(spread: Array) -> Indices:
     """Pixels to either side whose light is looked at, shape (n,)."""
-    return np.ceil(_REACH * spread.max(axis=1, initial=0.0)).astype(np.int64)
+    return np.ceil(_REACH * np.maximum(*spread.T)).astype(np.int64)
 
 
 def _alike(halves: Indices) -> Iterator[tuple[Indices, int]]:
@@ -91,5 +93,5 @@ def _alike(halves: Indices) -> Iterator[tuple[Indices, int]]:
 
 
 def _normal(weights: Array) -> Grey:
-    """Return weights whose rows add up to 1."""
-    return (weights / weights.sum(axis=1, keepdims=True)).astype(np.float32)
+    """Return weights whose columns add up to 1."""
+    return (weights / weights.sum(axis=0)).astype(np.float32)
