@@ -7,6 +7,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import rows_of
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Indices = NDArray[np.int64]
@@ -24,7 +26,7 @@ class Columns:
     def take(self, chosen: Mask | Indices) -> Self:
         """Return some of the items."""
         columns = self._columns()
-        return replace(self, **{n: column[chosen] for n, column in columns.items()})
+        return replace(self, **{n: rows_of(one, chosen) for n, one in columns.items()})
 
     @classmethod
     def join(cls, parts: Sequence[Self]) -> Self:

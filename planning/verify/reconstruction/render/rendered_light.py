@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from geometry.arrays import lengths
+from geometry.arrays import lengths, rows_of
 from geometry.rays.rays import CHUNK, RayCaster, equal_parts
 from planning.verify.reconstruction.arrays import Array, Columns, Grey, Indices
 from planning.verify.reconstruction.calibration import ProjectorCalibration
@@ -63,9 +63,13 @@ class Shown:
 
     def light(self, seen: RenderedView, in_focus_m: float) -> RenderedLight:
         """Return its light on a view's samples, edges in focus blurred by so much."""
-        cosine = self.projector.incidence_cosine(seen.points, seen.normals)
-        samples = np.flatnonzero(cosine > 0.0)
         # In parts, so that what is between stays in the cache.
+        parts = equal_parts(len(seen.points), CHUNK)
+        cosines = [
+            self.projector.incidence_cosine(seen.points[some], seen.normals[some])
+            for some in parts
+        ]
+        samples = np.flatnonzero(np.concatenate(cosines) > 0.0)
         parts = equal_parts(len(samples), CHUNK) or [slice(0)]
         light = RenderedLight.join(
             [self._light_on(seen, samples[some], in_focus_m) for some in parts]
@@ -82,12 +86,13 @@ class Shown:
         law = self.projector.light
         lit, cosine, pixels, depth = self._reached(seen, samples)
         # A pixel of the camera gathers light from where it falls on the surface.
-        rays, normals = seen.rays[lit], seen.normals[lit]
+        rays, normals = rows_of(seen.rays, lit), rows_of(seen.normals, lit)
         slopes = law.gradients(self.projector.panel_coordinates(pixels), depth)
-        slopes = slopes @ self.projector.world_from_device[:3, :3].T
+        turned = slopes.reshape(-1, 3) @ self.projector.world_from_device[:3, :3].T
+        slopes = turned.reshape(slopes.shape)
         slant = np.einsum("ikj,ij->ik", slopes, rays)
         slant /= np.einsum("ij,ij->i", normals, rays)[:, None]
-        slopes = slopes - slant[:, :, None] * normals[:, None]
+        slopes -= slant[:, :, None] * normals[:, None]
         cell = _PIXEL_SPREAD / seen.fold * seen.distances[lit] / seen.camera.focal_px
         scale = np.diag(self.projector.matrix)[:2]
         gathered = cell[:, None] * lengths(slopes) * scale
@@ -108,18 +113,19 @@ class Shown:
     ) -> tuple[Indices, Array, Array, Array]:
         """Samples that are lit, their cos(incidence), pixels and depths."""
         projector = self.projector
-        pixels, depth = projector.panel(seen.points[samples])
-        drawn = projector.in_panel(pixels)
-        able, pixels, depth = samples[drawn], pixels[drawn], depth[drawn]
-        pose, points = projector.world_from_device, seen.points[able]
+        pixels, depth = projector.panel(rows_of(seen.points, samples))
+        drawn = np.flatnonzero(projector.in_panel(pixels))
+        able, pixels, depth = samples[drawn], rows_of(pixels, drawn), depth[drawn]
+        pose, points = projector.world_from_device, rows_of(seen.points, able)
         starts, beams, reach = projector.light.aim(pose, points, depth)
         ray = starts, beams, reach * (1.0 - SHADOW_SLACK)
-        lit = ~self.caster.occluded(*ray)
+        clear = ~self.caster.occluded(*ray)
         if self.obstacles is not None:
-            lit &= ~self.obstacles.occluded(*ray)
-        cosine = -np.einsum("ij,ij->i", beams, seen.normals[able])
+            clear &= ~self.obstacles.occluded(*ray)
+        lit = np.flatnonzero(clear)
+        cosine = -np.einsum("ij,ij->i", beams, rows_of(seen.normals, able))
         if self.lamp is not None:
             # Even on a plane across the axis: across its rays light is denser.
             cosine /= beams @ projector.axis
             cosine /= 1.0 + self.lamp.leak
-        return able[lit], cosine[lit], pixels[lit], depth[lit]
+        return able[lit], cosine[lit], rows_of(pixels, lit), depth[lit]
