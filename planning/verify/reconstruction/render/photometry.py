@@ -12,7 +12,7 @@ from planning.verify.reconstruction.scanner import Scanner
 from .lamp import Lamp
 
 _WAVELENGTHS_M = (0.009, 0.017, 0.031)
-# Rows that are blurred at a time: what is between both passes stays in the cache.
+# Rows that are blurred, or captured, at a time: what is between stays in the cache.
 _STRIP = 64
 
 
@@ -104,16 +104,19 @@ class Photometry:
             key: Seeds the noise: one key, one noise, whatever the number of threads.
             gain: Grey levels in a unit of irradiance.
         """
-        level = grey * np.float32(gain)
         if not self.noisy:
-            return self._reported(level)
+            return self._reported(grey * np.float32(gain))
         rng = np.random.Generator(np.random.SFC64(np.random.SeedSequence(key)))
-        noise = rng.standard_normal(level.shape, dtype=np.float32)
-        variance = level * np.float32(255.0 / self.full_well)
-        variance += np.float32(self.read_noise**2)
-        level += noise * np.sqrt(variance)
-        reported = self._reported(np.clip(level, 0.0, 255.0))
-        return np.clip(np.rint(reported), 0.0, 255.0).astype(np.uint8)
+        captured = np.empty(grey.shape, dtype=np.uint8)
+        for first in range(0, len(grey), _STRIP):
+            level = grey[first : first + _STRIP] * np.float32(gain)
+            variance = level * np.float32(255.0 / self.full_well)
+            variance += np.float32(self.read_noise**2)
+            noise = rng.standard_normal(level.shape, dtype=np.float32)
+            level += noise * np.sqrt(variance)
+            reported = self._reported(np.clip(level, 0.0, 255.0))
+            captured[first : first + _STRIP] = np.rint(reported)
+        return captured
 
     def _reported(self, level: Grey) -> Grey:
         if self.gamma == 1.0:
@@ -150,8 +153,11 @@ def _smooth(image: Grey, taps: Grey, first: int, last: int, out: Grey) -> None:
     n = len(image)
     np.multiply(image[first:last], taps[0], out=out)
     for k in range(1, min(len(taps), n)):
+        # What rows give to those before them is what they give to those behind them.
+        begin = max(first - k, 0)
+        given = taps[k] * image[begin : last + k]
         low, high = max(first, k), min(last, n - k)
         if low < last:
-            out[low - first :] += taps[k] * image[low - k : last - k]
+            out[low - first :] += given[low - k - begin : last - k - begin]
         if high > first:
-            out[: high - first] += taps[k] * image[first + k : high + k]
+            out[: high - first] += given[first + k - begin : high + k - begin]
