@@ -15,7 +15,7 @@ import numpy as np
 from embreex.mesh_construction import TriangleMesh as _EmbreeMesh
 from embreex.rtcore_scene import EmbreeScene
 
-from geometry.arrays import Array, Ints, Mask, Single
+from geometry.arrays import Array, Ints, Mask, Single, rows_of
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.topology import numbered
 from geometry.parallel import mapped, n_threads
@@ -145,11 +145,11 @@ class RayCaster:
             hit = np.asarray(self._scene.run(start, along), dtype=np.int64)
             faces[part] = hit
             on = np.flatnonzero(hit >= 0)
-            face = hit[on]
-            ray = directions[part][on]
-            begin = origins if origins.ndim == 1 else origins[part][on]
-            towards = np.einsum("ij,ij->i", normals[face], anchors[face] - begin)
-            slope = np.einsum("ij,ij->i", normals[face], ray)
+            face, ray = hit[on], rows_of(directions[part], on)
+            normal = rows_of(normals, face)
+            begin = origins if origins.ndim == 1 else rows_of(origins[part], on)
+            towards = np.einsum("ij,ij->i", normal, anchors[face] - begin)
+            slope = np.einsum("ij,ij->i", normal, ray)
             slope = np.where(np.abs(slope) < 1e-12, np.copysign(1e-12, slope), slope)
             distances[part.start + on] = towards / slope
 
