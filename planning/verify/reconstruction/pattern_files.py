@@ -5,6 +5,7 @@ by the projector's response.
 """
 
 import json
+import zlib
 from collections.abc import Callable, Sequence
 from functools import cache, partial
 from pathlib import Path
@@ -174,7 +175,7 @@ def _once(make: Callable[[], _Made]) -> Callable[[], _Made]:
 def _png_writer(
     drawer: Callable[[], Callable[[Frame], NDArray[np.uint8]]], frame: Frame
 ) -> Callable[[BinaryIO], object]:
-    # Frames are large and flat: the fastest packing is small enough.
+    # Frames are large and flat: the fastest packing of runs is small enough.
     return lambda file: Image.fromarray(drawer()(frame)).save(
-        file, format="PNG", compress_level=1
+        file, format="PNG", compress_level=1, compress_type=zlib.Z_RLE
     )

@@ -12,14 +12,15 @@ px, and 0.014 where it is 0.7; averaged over whole pixels the lattice hardly sho
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.verify.reconstruction.arrays import Array, Grey, Indices
+from planning.verify.reconstruction.arrays import Array, Grey, Indices, Mask
 from planning.verify.reconstruction.calibration import ProjectorCalibration
 
-from .response import Response
+from .response import WHITE, Response
 from .ring_patterns import DrawnRings, Frame, RingsForCamera
 
 
@@ -96,6 +97,25 @@ class PanelCanvas:
         level = bright[k] + inwards[k] * self.inner + outwards[k] * self.outer
         return np.asarray(self.drawn * level, dtype=np.float32)
 
+    def levels(self, bright: Mask, response: Response) -> NDArray[np.uint8]:
+        """Return the grey levels of a frame whose annuli are bright or dark, (h, w)."""
+        places, beside = self._beside_borders
+        levels = (bright * np.uint8(WHITE)).take(self.annulus)
+        levels[self.drawn == 0.0] = 0
+        shares = beside.shares(bright.astype(np.float32))
+        levels.ravel()[places] = response.levels(shares)
+        return levels
+
+    @cached_property
+    def _beside_borders(self) -> tuple[Indices, "PanelCanvas"]:
+        """Pixels that more than one annulus, or what isn't drawn, has a share of."""
+        whole = (self.drawn == 0.0) | (self.drawn == 1.0)
+        whole &= (self.inner == 0.0) & (self.outer == 0.0)
+        places = np.flatnonzero(~whole)
+        of = (self.annulus, self.inner, self.outer, self.drawn)
+        parts = (values.ravel()[places] for values in of)
+        return places, PanelCanvas(self.window, *parts, {})
+
 
 def frame_levels(
     canvas: PanelCanvas, pattern: DrawnRings, frame: Frame, response: Response
@@ -110,7 +130,7 @@ def frame_levels(
     if frame.kind == "root":
         assert frame.camera is not None
         return response.levels(canvas.drawn * canvas.outside[frame.camera])
-    return response.levels(canvas.shares(pattern.bright(frame).astype(np.float32)))
+    return canvas.levels(pattern.bright(frame), response)
 
 
 def _slope(values: Array) -> Array:
