@@ -34,19 +34,43 @@ def mark_segments(
         for face in range(FACES):
             first, second, met = _clipped(starts[part], ends[part], face)
             segment, column, low, high = _by_column(cube, first, second)
-            begin = (owners[part][met[segment]] * FACES + face) * cube.n * cube.n
-            which, nth = _spread(high - low + 1)
-            flat[(begin + column)[which] + (low[which] + nth) * cube.n] = True
+            begin = (owners[part][met] * FACES + face) * cube.n * cube.n
+            begin = begin.take(segment) + column + low * cube.n
+            _, cells = _spread(begin, high - low + 1, cube.n)
+            flat[cells] = True
 
 
 def _clipped(starts: Array, ends: Array, face: int) -> tuple[Array, Array, Ints]:
-    """Return gnomonic ends, (m', 2), of the parts of segments on a face, and whose."""
+    """Return gnomonic ends, (2, m'), of the parts of segments on a face, and whose."""
     met = _may_meet(starts, ends, face)
     a, b = (
         np.stack([axis.take(met) for axis in face_coordinates(vectors, face)])
         for vectors in (starts, ends)
     )
-    low, high = np.zeros(met.size), np.ones(met.size)
+    first, second = _gnomonic(a), _gnomonic(a + (b - a))
+    # Most lie on the face from end to end.
+    out = np.flatnonzero(~(_on_face(a) & _on_face(b)))
+    a, b = a.take(out, axis=1), b.take(out, axis=1)
+    first[:, out], second[:, out] = _clipped_ends(a, b)
+    kept = np.flatnonzero(~np.isnan(first[0]))
+    return first.take(kept, axis=1), second.take(kept, axis=1), met[kept]
+
+
+def _gnomonic(vectors: Array) -> Array:
+    """Return x / z and y / z of vectors in the frame of a face, (3, m) to (2, m)."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return vectors[:2] / vectors[2]
+
+
+def _on_face(vectors: Array) -> Mask:
+    """Return which vectors, in the frame of a face, lie on it, off its edge."""
+    x, y, z = vectors
+    return (1.0 - _MARGIN) * z > np.maximum(np.abs(x), np.abs(y))
+
+
+def _clipped_ends(a: Array, b: Array) -> tuple[Array, Array]:
+    """Return gnomonic ends of what is on a face of each segment, NaN where none is."""
+    low, high = np.zeros(a.shape[1]), np.ones(a.shape[1])
     for axis in (0, 1):
         for sign in (1.0, -1.0):
             # A little of the neighbouring face is kept, against rounding.
@@ -57,22 +81,15 @@ def _clipped(starts: Array, ends: Array, face: int) -> tuple[Array, Array, Ints]
             low = np.where(change > 0, np.maximum(low, cut), low)
             high = np.where(change < 0, np.minimum(high, cut), high)
             high = np.where((change == 0) & (inside < 0), -1.0, high)
-    kept = np.flatnonzero(low <= high + _MARGIN)
-    a, b, met = a.take(kept, axis=1), b.take(kept, axis=1), met[kept]
-    ends_met = []
-    for t in (low[kept], high[kept]):
-        point = a + t * (b - a)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ends_met.append((point[:2] / point[2]).T)
-    first, second = ends_met
+    low[low > high + _MARGIN] = np.nan
+    first, second = _gnomonic(a + low * (b - a)), _gnomonic(a + high * (b - a))
     # Where a segment passes through the origin one end has no direction.
-    bad = ~np.isfinite(first).all(axis=1)
-    first[bad] = second[bad]
-    bad = ~np.isfinite(second).all(axis=1)
-    second[bad] = first[bad]
-    seen = np.isfinite(first).all(axis=1)
-    first = np.clip(first[seen], -1.0, 1.0)
-    return first, np.clip(second[seen], -1.0, 1.0), met[seen]
+    bad = ~np.isfinite(first).all(axis=0) & ~np.isnan(low)
+    first[:, bad] = second[:, bad]
+    bad = ~np.isfinite(second).all(axis=0)
+    second[:, bad] = first[:, bad]
+    first[:, ~np.isfinite(first).all(axis=0)] = np.nan
+    return np.clip(first, -1.0, 1.0), np.clip(second, -1.0, 1.0)
 
 
 def _may_meet(starts: Array, ends: Array, face: int) -> Ints:
@@ -89,34 +106,35 @@ def _may_meet(starts: Array, ends: Array, face: int) -> Ints:
 def _by_column(cube: CubeMap, first: Array, second: Array) -> tuple[Ints, ...]:
     """Segment and column of each two that meet, and the first and last row there."""
     low, high = np.minimum(first, second), np.maximum(first, second)
-    begin, end = _index(cube, low[:, 0] - _MARGIN), _index(cube, high[:, 0] + _MARGIN)
+    begin, end = cube.cells_at(low[0] - _MARGIN), cube.cells_at(high[0] + _MARGIN)
     step = second - first
     with np.errstate(divide="ignore", invalid="ignore"):
-        slope = step[:, 1] / step[:, 0]
-    segment, nth = _spread(end - begin + 1)
-    column = begin[segment] + nth
-    reached = []
-    for x in (cube.lines[column] - _MARGIN, cube.lines[column + 1] + _MARGIN):
-        with np.errstate(invalid="ignore"):
-            y = first[segment, 1] + (x - first[segment, 0]) * slope[segment]
-        reached.append(np.clip(y, low[segment, 1], high[segment, 1]))
+        slope = step[1] / step[0]
     # Upright segments have no slope: they meet all their rows.
-    upright = ~(np.abs(step[segment, 0]) > _MARGIN)
-    bottom = np.where(upright, low[segment, 1], np.minimum(*reached))
-    top = np.where(upright, high[segment, 1], np.maximum(*reached))
-    return segment, column, _index(cube, bottom - _MARGIN), _index(cube, top + _MARGIN)
+    upright = ~(np.abs(step[0]) > _MARGIN)
+    segment, column = _spread(begin, end - begin + 1)
+    x, y, slope = first[0].take(segment), first[1].take(segment), slope.take(segment)
+    lowest, highest = low[1].take(segment), high[1].take(segment)
+    with np.errstate(invalid="ignore"):
+        left, right = (
+            np.clip(y + (line - x) * slope, lowest, highest)
+            for line in (
+                cube.lines.take(column) - _MARGIN,
+                cube.lines.take(column + 1) + _MARGIN,
+            )
+        )
+    upright = upright.take(segment)
+    bottom = np.where(upright, lowest, np.minimum(left, right))
+    top = np.where(upright, highest, np.maximum(left, right))
+    bottom, top = bottom - _MARGIN, top + _MARGIN
+    return segment, column, cube.cells_at(bottom), cube.cells_at(top)
 
 
-def _index(cube: CubeMap, steps: Array) -> Ints:
-    line = np.searchsorted(cube.lines, steps, side="right") - 1
-    return np.clip(line, 0, cube.n - 1)
-
-
-def _spread(counts: Ints) -> tuple[Ints, Ints]:
-    """Return which thing each of its parts belongs to, and its number among them."""
+def _spread(begin: Ints, counts: Ints, step: int = 1) -> tuple[Ints, Ints]:
+    """Return which thing each of its parts belongs to, and steps from its beginning."""
     which = np.repeat(np.arange(counts.size), counts)
-    nth = np.arange(which.size) - np.repeat(np.cumsum(counts) - counts, counts)
-    return which, nth
+    begin = begin - step * (np.cumsum(counts) - counts)
+    return which, begin.take(which) + np.arange(0, step * which.size, step)
 
 
 @dataclass(frozen=True, eq=False)

@@ -45,6 +45,25 @@ class CubeMap:
         """Gnomonic coordinates of the lines between cells, shape (n + 1,)."""
         return np.tan(np.linspace(-0.25 * np.pi, 0.25 * np.pi, self.n + 1))
 
+    def cells_at(self, gnomonic: Array) -> Ints:
+        """Return the row or column of each coordinate in [-1, 1], or a little beyond.
+
+        What a binary search among the lines finds takes seven times as long.
+        """
+        steps = ((gnomonic + 1.0) * (2.0 * self.n)).astype(np.intp)
+        cell = self._cells_of_steps.take(steps, mode="clip")
+        return cell + (gnomonic >= self._upper_lines.take(cell))
+
+    @cached_property
+    def _cells_of_steps(self) -> Ints:
+        """The cell in which each of 4 n equal steps begins: it meets one more at most."""
+        begin = np.arange(4 * self.n) / (2.0 * self.n) - 1.0 - _ROUNDING
+        return np.maximum(np.searchsorted(self.lines, begin, side="right") - 1, 0)
+
+    @cached_property
+    def _upper_lines(self) -> Array:
+        return np.append(self.lines[1:-1], np.inf)
+
     @cached_property
     def corners(self) -> Array:
         """Unit directions of the corners of cells, shape (6, n + 1, n + 1, 3)."""
