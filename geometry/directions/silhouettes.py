@@ -149,14 +149,15 @@ class Silhouettes:
             f, g = self._pairs.T
             words = (words & among[f] & among[g]) | (among[f] ^ among[g])
         owners, edges = unpacked(words & sides.above, len(sides.local))
-        ends = self._ends[edges]
         # Column by column: rows of three are too short for numpy's loops.
-        from_points = [coordinate.take(owners) for coordinate in sides.local.T]
-        begin, end = (
-            np.stack([v.take(e) for v in self._columns]) - from_points
-            for e in np.ascontiguousarray(ends.T)
+        points, axes = (
+            np.ascontiguousarray(columns.T).take(owners, axis=1)
+            for columns in (sides.local, sides.normals)
         )
-        axes = np.stack([coordinate.take(owners) for coordinate in sides.normals.T])
+        begin, end = (
+            self._columns.take(e, axis=1) - points
+            for e in self._ends.T.take(edges, axis=1)
+        )
         near = np.flatnonzero(_may_cross(begin, end, axes, half_angle))
         return owners[near], begin.take(near, axis=1).T, end.take(near, axis=1).T
 
@@ -201,14 +202,20 @@ class Silhouettes:
 def _may_cross(begin: Array, end: Array, axes: Array, half_angle: float) -> Mask:
     """Return which segments the ball about their middle lets into a cone; (3, m)."""
     middle = begin + end
-    distance, size = lengths(middle.T), lengths((end - begin).T)
+    distance = lengths(middle.T)
+    x, y, z = middle * axes
+    along = x + y + z
+    # The middles of most lie in the cone: the others alone are worth angles.
+    crosses = along > distance * (np.cos(half_angle) + _ANGLE)
+    rest = np.flatnonzero(~crosses)
+    distance, along = distance[rest], along[rest]
+    size = lengths((end.take(rest, axis=1) - begin.take(rest, axis=1)).T)
     around = size >= distance
     apart = np.where(around, 1.0, distance)
-    x, y, z = middle * axes
-    cosine = (x + y + z) / apart
     spread = np.arcsin(np.where(around, 0.0, size) / apart)
-    off = np.arccos(np.clip(cosine, -1.0, 1.0))
-    return around | (off - spread <= half_angle + _ANGLE)
+    off = np.arccos(np.clip(along / apart, -1.0, 1.0))
+    crosses[rest] = around | (off - spread <= half_angle + _ANGLE)
+    return crosses
 
 
 def _pairs_and_borders(edges: MeshEdges) -> tuple[Ints, Ints]:
