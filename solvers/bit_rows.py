@@ -160,3 +160,30 @@ class BitSum:
             places += self._offsets
             total[part] = self._table.take(places).sum(axis=1)
         return total
+
+
+class BitSums:
+    """Several of them, (n_sums, n), at once: numpy's calls cost more than few rows."""
+
+    def __init__(self, values: NDArray[np.int64]) -> None:
+        self._each = [BitSum(each) for each in values]
+        distinct = np.unique(values[values != 0])
+        self._masks = None
+        if distinct.size <= _FEW_VALUES:
+            self._masks = [(value, pack_rows(values == value)) for value in distinct]
+
+    @property
+    def units(self) -> float:
+        """Work that a word costs."""
+        return sum(each.units for each in self._each)
+
+    def __call__(self, rows: NDArray[np.uint64]) -> NDArray[np.int64]:
+        """Return the sums of each bit row, shape (n, n_sums)."""
+        if self._masks is None:
+            return np.stack([each(rows) for each in self._each], axis=1)
+        total = np.zeros((len(rows), len(self._each)), dtype=np.int64)
+        for part in parts(len(rows), _LARGE // len(self._each) + 1):
+            for value, masks in self._masks:
+                counts = np.bitwise_count(rows[part, None] & masks)
+                total[part] += value * counts.sum(axis=2, dtype=np.int64)
+        return total

@@ -56,7 +56,7 @@ class CubeMap:
 
     @cached_property
     def _cells_of_steps(self) -> Ints:
-        """The cell in which each of 4 n equal steps begins: it meets one more at most."""
+        """Return in which cell each of 4 n equal steps begins: it meets two at most."""
         begin = np.arange(4 * self.n) / (2.0 * self.n) - 1.0 - _ROUNDING
         return np.maximum(np.searchsorted(self.lines, begin, side="right") - 1, 0)
 

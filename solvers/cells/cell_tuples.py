@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.bit_rows import BitSum, pack_rows, parts
+from solvers.bit_rows import BitSum, BitSums, pack_rows, parts
 from solvers.status import WorkBudget
 
 from .cell_problem import WholeRows
@@ -84,14 +84,15 @@ class Enough:
         self._planes = int(min(needs.max(initial=0), n_poses))
         self._exactly = pack_rows(needs == np.arange(self._planes + 1)[:, None])
         self._simple = bool(np.all(needs == 1))
-        self._needed, self._needed_total = whole.needed, whole.needed_total
-        self._sums = [
-            BitSum(np.where(whole.row_sets == g, whole.weights, 0))
-            for g in range(len(whole.needed))
-        ]
+        sets = np.arange(len(whole.needed))[:, None]
+        self._sums = BitSums(np.where(whole.row_sets == sets, whole.weights, 0))
+        self._sum = BitSum(whole.weights)
+        # What is required of each set is required of all.
+        self._least = max(whole.needed_total, sum(whole.needed))
+        self._floors = np.array(whole.needed)
         words = self._exactly.shape[1]
         per_word = 2.0 * n_poses * max(1, self._planes)
-        self.units = words * (per_word + sum(s.units for s in self._sums))
+        self.units = words * (per_word + self._sums.units)
         self.batch = max(1, _WORDS // (words * (1 + n_poses + self._planes)))
 
     def served(self, rows: NDArray[np.uint64]) -> NDArray[np.uint64]:
@@ -116,22 +117,28 @@ class Enough:
     ) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
         """Return whether each K rows meet every set, and what they serve in all."""
         covered = self.served(rows)
-        each = np.stack([weigh(covered) for weigh in self._sums])
-        meets = [w >= needed for w, needed in zip(each, self._needed, strict=True)]
-        served = each.sum(axis=0)
-        return np.all(meets, axis=0) & (served >= self._needed_total), served
+        served = self._sum(covered)
+        meets = served >= self._least
+        if self._floors.size > 1:
+            some = np.flatnonzero(meets)
+            each = self._sums(covered.take(some, axis=0))
+            meets[some] = np.all(each >= self._floors, axis=1)
+        return meets, served
 
 
 def _weigh(
     nodes: NDArray[np.int64], subtrees: Subtrees, enough: Enough
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the multisets that remain, and what they serve at most."""
-    nodes = nodes[np.all(nodes != VOID, axis=1)]
-    nodes = nodes[subtrees.costs[nodes].sum(axis=1) >= subtrees.floor]
+    # Subtrees stand in order, and what is void before all others.
+    nodes = nodes[nodes[:, 0] != VOID]
+    nodes = nodes[subtrees.costs.take(nodes.T).sum(axis=0) >= subtrees.floor]
     weights = np.zeros(len(nodes), dtype=np.int64)
     meets = np.zeros(len(nodes), dtype=bool)
     for part in parts(len(nodes), enough.batch):
-        meets[part], weights[part] = enough(subtrees.rows[nodes[part]])
+        # One cell of all multisets after the other: numpy copies and joins whole rows.
+        rows = subtrees.rows.take(nodes[part].T, axis=0)
+        meets[part], weights[part] = enough(rows.transpose(1, 0, 2))
     return nodes[meets], weights[meets]
 
 
@@ -142,12 +149,11 @@ def _split(
     final = np.zeros(nodes.shape, dtype=bool)
     settled: list[NDArray[np.int64]] = []
     while len(nodes):
-        ranks = np.where(final, _NEVER, subtrees.coarseness[nodes])
-        which = np.argmin(ranks, axis=1)
-        if np.any(np.take_along_axis(final, which[:, None], axis=1)):
-            ended = np.take_along_axis(final, which[:, None], axis=1).ravel()
-            return nodes[:0], nodes[int(np.argmax(ended))]
-        chosen = np.take_along_axis(nodes, which[:, None], axis=1).ravel()
+        ranks = np.where(final, _NEVER, subtrees.coarseness.take(nodes))
+        coarsest = np.arange(len(nodes)), np.argmin(ranks, axis=1)
+        if np.any(final[coarsest]):
+            return nodes[:0], nodes[int(np.argmax(final[coarsest]))]
+        chosen = nodes[coarsest]
         halves = subtrees.halves(chosen)
         leaf = halves[:, 0] == chosen
         settled += _uses(nodes[~leaf], chosen[~leaf], halves[~leaf])
@@ -163,8 +169,9 @@ def _uses(
     multisets: list[NDArray[np.int64]] = []
     at = nodes == chosen[:, None]
     uses = at.sum(axis=1)
-    for m in np.unique(uses):
-        rows, places, two = nodes[uses == m], at[uses == m], halves[uses == m]
+    for m in np.flatnonzero(np.bincount(uses)):
+        some = np.flatnonzero(uses == m)
+        rows, places, two = (each.take(some, axis=0) for each in (nodes, at, halves))
         for second in range(m + 1):
             parts_of = np.repeat(two, [m - second, second], axis=1)
             new = rows.copy()
