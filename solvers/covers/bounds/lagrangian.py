@@ -41,25 +41,30 @@ def tighten(
     weights, total, by_set = cover.weights, cover.total, cover.by_set
     if np.any(cover.needs > 1):
         by_set = sparse.csr_array(by_set.multiply(1.0 / cover.needs[None]))
-    by_row = by_set.T
 
     def bound(shares: _Array) -> tuple[float, _Array]:
-        payments = by_set @ (shares * weights)
+        multipliers = shares * weights
+        payments = by_set @ multipliers
         top = costliest(cover, payments)[:n_sets]
         sets = np.zeros(payments.size)
         sets[top] = 1.0
         paid = float(payments[top].sum())
-        others = float(np.sum(weights - shares * weights))
+        others = float(np.sum(weights - multipliers))
         return (others + paid) * (1.0 + rounding(weights.size)), sets
 
     aim = min(target, total) * 0.998
     best = np.clip(start / weights, 0.0, 1.0)
     lowest, mean = bound(best)
+    taken, serves = np.flatnonzero(mean), by_set[np.flatnonzero(mean)].T
     step, stale, mark = 1.0, 0, lowest
     for i in range(_MOST_STEPS):
         if lowest < target or budget.exhausted:
             break
-        excess = 1.0 - by_row @ mean
+        if np.count_nonzero(mean) > taken.size:
+            # Of all sets few are ever among the costliest.
+            taken = np.flatnonzero(mean)
+            serves = by_set[taken].T
+        excess = 1.0 - serves @ mean[taken]
         moving = np.where(excess > 0, best < 1.0, best > 0.0)
         length = float(np.sum(weights * excess * excess * moving))
         if not length > 0:
