@@ -25,6 +25,9 @@ _EXACT = float(1 << 23)
 _STEP = 2.0**-12
 # A dense multiply-add in single precision costs this share of a unit of work.
 _DENSE_UNIT = 1.0 / 16.0
+# Multiply-adds up to which OpenBLAS multiplies matrices without copying them first; of
+# few parts the copy takes longer than the product.
+_UNCOPIED, _FEW_PARTS = 1_000_000, 8
 # Work of choosing the costliest, for each part and set.
 _CHOOSE = 6.0
 _MEMORY = 0.9
@@ -82,6 +85,7 @@ class PartBounds:
         self._target, self._budget = target, budget
         self._leaves_out = leaves_out
         self._grid = 2.0 ** max(0.0, np.ceil(np.log2(self._total / _EXACT)))
+        self._most_steps = self._weights / self._grid
 
     def whole(self, shares: NDArray[np.float64]) -> GroupPart:
         """Return the part of all selections, not bounded yet."""
@@ -107,6 +111,8 @@ class PartBounds:
             live = [part for part in live if part.bound >= self._target]
         return bounded + live
 
+    # BLAS flags what it finds beside short rows, now and then.
+    @np.errstate(invalid="ignore")
     def _stepped(self, parts: list[GroupPart]) -> list[GroupPart]:
         weights, aim = self._weights, 0.998 * self._target
         costliest = _Costliest(parts, self.n_sets)
@@ -118,9 +124,8 @@ class PartBounds:
         step = np.array([part.pace[0] for part in parts])
         stale = np.array([part.pace[1] for part in parts])
         for _ in range(_ROUND):
-            primal = np.round(primal / _STEP) * _STEP
-            reached = primal.astype(np.float32) @ self.covers
-            excess = 1.0 - reached.astype(np.float64)
+            primal = np.rint(primal / _STEP) * _STEP
+            excess = 1.0 - self._reached(primal.astype(np.float32)).astype(np.float64)
             moving = np.where(excess > 0, best < 1.0, best > 0.0)
             length = np.maximum((excess * excess * moving) @ weights, 1e-9)
             far = np.maximum(bounds - aim, 1e-4 * self._total)
@@ -128,9 +133,8 @@ class PartBounds:
             values, taken, others = self._bounds(costliest, shares)
             primal = _MEMORY * primal + (1.0 - _MEMORY) * taken
             lower = values < bounds
-            best = np.where(lower[:, None], shares, best)
+            best[lower], spared[lower] = shares[lower], others[lower]
             bounds = np.minimum(bounds, values)
-            spared = np.where(lower[:, None], others, spared)
             stale = np.where(lower, 0, stale + 1)
             step = np.where(lower, np.minimum(1.1 * step, 4.0), step)
             step = np.where(~lower & (stale % 5 == 0), 0.6 * step, step)
@@ -161,10 +165,8 @@ class PartBounds:
         The latter two have shape (p, n_s): selections with a set beside the groups
         cover so much less than the bound at most.
         """
-        steps = np.floor(shares * (self._weights / self._grid))
-        # Kernels of BLAS flag what they find beside short rows, now and then.
-        with np.errstate(invalid="ignore"):
-            payments = steps.astype(np.float32) @ self.covers.T
+        steps = np.floor(shares * self._most_steps)
+        payments = self._payments(steps.astype(np.float32))
         self._budget.spend(
             2.0 * len(shares) * self.covers.size * _DENSE_UNIT
             + _CHOOSE * payments.size
@@ -175,6 +177,22 @@ class PartBounds:
         bounds = self._total + self._grid * (paid - steps.sum(axis=1))
         return bounds, taken, self._grid * spared
 
+    def _reached(self, primal: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return how often selections, (p, n_s), cover each row, (p, n_e)."""
+        if len(primal) > _FEW_PARTS:
+            return primal @ self.covers
+        # Few parts take few of the sets.
+        some = np.flatnonzero(primal.any(axis=0))
+        return primal[:, some] @ self.covers[some]
+
+    def _payments(self, steps: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return what each set pays, (p, n_s), by multipliers, (p, n_e)."""
+        if len(steps) > _FEW_PARTS:
+            return steps @ self.covers.T
+        width = max(1, _UNCOPIED // steps.size)
+        firsts = range(0, len(self.covers), width)
+        return np.hstack([steps @ self.covers[i : i + width].T for i in firsts])
+
 
 class _Costliest:
     """The costliest selections of parts, found together at ever new payments."""
@@ -182,7 +200,8 @@ class _Costliest:
     def __init__(self, parts: list[GroupPart], n_sets: int) -> None:
         self._closed = np.stack([part.closed for part in parts])
         n_groups = np.array([len(part.groups) for part in parts])
-        self._spare = n_sets - n_groups
+        spare = n_sets - n_groups
+        self._alike = [(k, np.flatnonzero(spare == k)) for k in set(spare[spare > 0])]
         groups = [group for part in parts for group in part.groups]
         sizes = np.array([len(group) for group in groups], dtype=np.int64)
         # All groups in one row: their sets, and of which part and group each is.
@@ -210,12 +229,11 @@ class _Costliest:
             first = best[np.searchsorted(best, self._starts)]
             taken[self._part, self._sets[first]] = True
         others = np.where(self._closed | taken, np.float32(-1.0), payments)
-        for spare in np.unique(self._spare[self._spare > 0]):
-            rows = np.flatnonzero(self._spare == spare)
+        for spare, rows in self._alike:
             some = others[rows]
             last = min(int(spare), some.shape[1]) - 1
             top = np.argpartition(-some, last, axis=1)[:, :spare]
-            costs = np.take_along_axis(some, top, axis=1)
+            costs = some[np.arange(len(some))[:, None], top]
             row, column = np.nonzero(costs > 0.0)
             taken[rows[row], top[row, column]] = True
             # Where fewer pay than are spare, any may join them: 0.
