@@ -52,10 +52,11 @@ class Swaps:
         self._unit = _exact_unit(cover.weights)
         exact = np.float64 if self._unit is None else np.float32
         self._weights = (cover.weights / (self._unit or 1.0)).astype(exact)
-        self._serves = cover.by_row.astype(bool).toarray()
+        self._serves = cover.by_set.astype(bool).toarray().T.copy()
         self._counts = np.zeros(cover.weights.size, dtype=np.int64)
         # Sum of 1 + s over the sets that cover a row: its owner, where there's but one.
         self._owners = np.zeros(cover.weights.size, dtype=np.int64)
+        self._places = np.zeros(cover.n_sets + 1, dtype=np.int64)
         budget.spend(float(self._serves.size))
         for s in chosen:
             self.add(s)
@@ -63,7 +64,8 @@ class Swaps:
     def add(self, s: int) -> None:
         """Select one set more."""
         rows = self._members(s)
-        touched = rows[self._counts[rows] <= 1]
+        counts = self._counts[rows]
+        touched = rows[counts <= 1]
         # What was open is its own now; what one set covered alone isn't any more.
         sums = self._sums_by_owner([*self.chosen, _NOBODY], touched)
         self.covered += float(self.gain[s])
@@ -71,7 +73,7 @@ class Swaps:
         self.regain -= sums[:-1]
         self.regain = np.concatenate([self.regain, sums[-1:]])
         self.chosen.append(s)
-        self._counts[rows] += 1
+        self._counts[rows] = counts + 1
         self._owners[rows] += s + 1
 
     def drop(self, position: int) -> None:
@@ -80,11 +82,12 @@ class Swaps:
         lost = self.regain[position]
         self.gain += lost
         self.covered -= float(lost[s])
-        self.regain = np.delete(self.regain, position, axis=0)
+        others = self.regain[:position], self.regain[position + 1 :]
+        self.regain = np.concatenate(others)
         rows = self._members(s)
-        self._counts[rows] -= 1
+        self._counts[rows] = counts = self._counts[rows] - 1
         self._owners[rows] -= s + 1
-        self.regain += self._sums_by_owner(self.chosen, rows[self._counts[rows] == 1])
+        self.regain += self._sums_by_owner(self.chosen, rows[counts == 1])
 
     def best_swap(
         self,
@@ -107,8 +110,8 @@ class Swaps:
             change[tabu & (change <= beyond)] = -np.inf
         if sold_out is not None:
             change[sold_out] = -np.inf
-        out, into = np.unravel_index(int(np.argmax(change)), change.shape)
-        return float(change[out, into]), int(out), int(into)
+        out, into = divmod(int(np.argmax(change)), change.shape[1])
+        return float(change[out, into]), out, into
 
     def _members(self, s: int) -> NDArray[np.signedinteger]:
         by_set = self._cover.by_set
@@ -119,9 +122,8 @@ class Swaps:
     ) -> NDArray[np.float64]:
         """Return w(rows of owner o that set j covers), shape (n_owners, n_s)."""
         n_sets = self._cover.n_sets
-        place = np.zeros(n_sets + 1, dtype=np.int64)
-        place[np.array(owners, dtype=np.int64) + 1] = np.arange(len(owners))
-        owner = place[self._owners[rows]]
+        self._places[[s + 1 for s in owners]] = np.arange(len(owners))
+        owner = self._places[self._owners[rows]]
         # Sorted by owner, so that a block of rows has few of them.
         order = np.argsort(owner, kind="stable")
         rows, owner = rows[order], owner[order]
@@ -129,11 +131,14 @@ class Swaps:
         step = max(1, _BLOCK // max(1, n_sets))
         for start in range(0, rows.size, step):
             part = slice(start, start + step)
-            few = np.arange(owner[part][0], owner[part][-1] + 1)
-            factors = (few[:, None] == owner[part]) * self._weights[rows[part]]
-            serves = self._serves.take(rows[part], axis=0).astype(factors.dtype)
-            total[few] += factors @ serves
-            self._budget.spend(serves.size * (1.0 + _PRODUCT_UNIT * few.size))
+            weights = self._weights[rows[part]]
+            serves = self._serves.take(rows[part], axis=0).astype(weights.dtype)
+            few = range(int(owner[part][0]), int(owner[part][-1]) + 1)
+            ends = [0, *np.searchsorted(owner[part], few, side="right").tolist()]
+            # One by one, since BLAS copies the rows for several before it multiplies.
+            for o, own in zip(few, map(slice, ends, ends[1:]), strict=True):
+                total[o] += weights[own] @ serves[own]
+            self._budget.spend(serves.size * (1.0 + _PRODUCT_UNIT * len(few)))
         self._budget.spend(total.size + _CALL_UNITS)
         return total if self._unit is None else total * self._unit
 
