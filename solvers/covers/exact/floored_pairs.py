@@ -32,14 +32,18 @@ def least_lacking(
     if n_sets > _MOST or products > _MAX_PRODUCTS:
         return None
     budget.spend(products * DENSE_UNIT + cover.entries)
+    # Whole grains, so that their sums are exact in single precision where they are few.
+    single = cover.total / cover.grain < 2.0**24
+    of_rows = (cover.weights / cover.grain).astype(np.float32 if single else np.float64)
     missed = ~cover.by_set.astype(bool).toarray()
     spare, spare_of_all = cover.totals - cover.quotas, cover.total - cover.quota
     lacking, missing = np.zeros(1), np.zeros(1)
     for g in range(cover.quotas.size):
         rows = np.flatnonzero(cover.row_sets == g)
-        each = missed[:, rows].astype(np.float64)
-        weights = cover.weights[rows]
+        weights = of_rows[rows]
+        each = missed[:, rows].astype(weights.dtype)
         of_set = each @ weights if n_sets == 1 else (each * weights) @ each.T
+        of_set = of_set.astype(np.float64) * cover.grain
         lacking = lacking + np.maximum(of_set - spare[g], 0.0)
         missing = missing + of_set
     lacking = lacking + np.maximum(missing - spare_of_all, 0.0)
