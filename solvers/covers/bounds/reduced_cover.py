@@ -17,7 +17,6 @@ class ReducedCover:
     Attributes:
         problem: What it was made from.
         by_set: Ones where set s serves row e, shape (n_s, n_e), CSR.
-        by_row: The transpose, shape (n_e, n_s), CSR.
         weights: Integer-valued weight of each row, positive, shape (n_e,).
         needs: Sets that must serve each row, positive, shape (n_e,).
         row_sets: Row set of each row, shape (n_e,).
@@ -36,7 +35,6 @@ class ReducedCover:
 
     problem: CoverProblem
     by_set: sparse.csr_array
-    by_row: sparse.csr_array
     weights: NDArray[np.float64]
     needs: NDArray[np.int64]
     row_sets: NDArray[np.int64]
@@ -54,6 +52,11 @@ class ReducedCover:
     def n_sets(self) -> int:
         """Number of sets."""
         return self.kept.size
+
+    @cached_property
+    def by_row(self) -> sparse.csr_array:
+        """Ones where row e is served by set s, shape (n_e, n_s), CSR."""
+        return sparse.csr_array(self.by_set.T)
 
     @cached_property
     def simple(self) -> bool:
@@ -77,7 +80,6 @@ class ReducedCover:
         return replace(
             self,
             by_set=self.by_set[:, rows],
-            by_row=self.by_row[rows],
             weights=self.weights[rows],
             needs=self.needs[rows],
             row_sets=np.zeros(rows.size, dtype=np.int64),
@@ -92,7 +94,6 @@ class ReducedCover:
         return replace(
             self,
             by_set=self.by_set[sets],
-            by_row=self.by_row[:, sets],
             costs=self.costs[sets],
             kept=self.kept[sets],
             stand_in=place[self.stand_in],

@@ -58,7 +58,8 @@ def reduce_problem(
     live = (whole > 0) & (needs > 0) & (servers >= needs)
     labels = np.stack([needs[live], row_sets[live]], axis=1)
     bits, first, inverse = _merge_rows(problem, live, labels)
-    dense = np.unpackbits(bits, axis=1, count=costs.size).astype(bool)
+    rows = np.unpackbits(bits, axis=1, count=costs.size).view(bool)
+    sets = np.ascontiguousarray(rows.T)
     merged = np.bincount(inverse, weights=whole[live], minlength=first.size)
     merged, needs = merged.astype(np.float64), needs[live][first]
     stock = problem.stock - np.bincount(
@@ -66,12 +67,12 @@ def reduce_problem(
     )
     free = stock >= np.bincount(problem.kinds, minlength=stock.size)
     own = np.where(free[problem.kinds], -1, problem.kinds)
-    kept, stand_in = _undominated(dense, merged, needs, costs, own)
-    by_row = sparse.csr_array(sparse_rows(dense[:, kept]), dtype=np.float64)
+    by_set = sparse_rows(sets)
+    # Weights are whole numbers: their sums don't depend on the order.
+    kept, stand_in = _undominated(sets, by_set @ merged, needs, costs, own)
     return ReducedCover(
         problem=problem,
-        by_set=sparse.csr_array(by_row.T),
-        by_row=by_row,
+        by_set=sparse.csr_array(by_set[kept], dtype=np.float64),
         weights=merged,
         needs=needs,
         row_sets=row_sets[live][first],
@@ -148,28 +149,27 @@ def _merge_rows(
 
 
 def _undominated(
-    dense: NDArray[np.bool_],
-    weights: NDArray[np.float64],
+    sets: NDArray[np.bool_],
+    gains: NDArray[np.float64],
     needs: NDArray[np.int64],
     costs: NDArray[np.float64],
     own: NDArray[np.int64],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the columns that no others make superfluous, and who stands in for each.
+    """Return the sets that no others make superfluous, and who stands in for each.
 
-    The first are column numbers, increasing; the second count among these. Columns of
-    a kind whose stock binds, `own` >= 0, stand in only for that kind.
+    The first are numbers of sets, rows of a matrix (n_s, n_e), increasing; the second
+    count among these. Gains are what sets weigh. Sets of a kind whose stock binds,
+    `own` >= 0, stand in only for that kind.
     """
-    n_sets = dense.shape[1]
-    # Weights are whole numbers: their sums don't depend on the order.
-    gains = sparse_rows(dense).T @ weights
+    n_sets = len(sets)
     # A superset weighs more, so only earlier columns of this order can dominate.
     order = np.lexsort((np.arange(n_sets), costs, -gains))
     order = order[gains[order] > 0]
-    words = pack_shuffled(dense[:, order].T)
+    words = pack_shuffled(sets)[order]
     sketch = words[:, :_SKETCH_WORDS]
     rivals_wanted = np.ones(order.size, dtype=np.int64)
     for need in np.unique(needs[needs > 1]):
-        served = np.any(dense[needs == need], axis=0)
+        served = np.any(sets[:, needs == need], axis=1)
         rivals_wanted[np.flatnonzero(served[order])] = need
 
     better = np.arange(order.size)
@@ -188,11 +188,12 @@ def _undominated(
             some = lack[:n] if places.size == n else lack[places]
             places = places[(some & word) == 0]
         rivals = standing[places]
-        rivals = rivals[costs[rivals] <= costs[j]]
-        kind = own[rivals]
-        rivals = rivals[(kind < 0) | (kind == own[j])]
-        compared += rivals.size * words.shape[1]
-        rivals = rivals[~np.any(words[j] & ~words[rivals], axis=1)]
+        if rivals.size:
+            rivals = rivals[costs[rivals] <= costs[j]]
+            kind = own[rivals]
+            rivals = rivals[(kind < 0) | (kind == own[j])]
+            compared += rivals.size * words.shape[1]
+            rivals = rivals[~np.any(words[j] & ~words[rivals], axis=1)]
         if rivals.size >= rivals_wanted[j]:
             better[j] = rivals[0]
         else:

@@ -141,9 +141,7 @@ class _Refutation:
         self.by_set = sparse.csr_array(by_row.T)
         self.covered = np.any(covers[first], axis=1)
         # Bounds take whole steps of weights: of ones there would be two.
-        self.cover = replace(
-            reduced, by_set=self.by_set, by_row=by_row, weights=counts * _FINE
-        )
+        self.cover = replace(reduced, by_set=self.by_set, weights=counts * _FINE)
         self.multipliers: list[NDArray[np.uint8]] = []
         self.paid: list[NDArray[np.float64]] = []
         self.unpaid: list[int] = []
