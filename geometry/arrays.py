@@ -39,6 +39,23 @@ def lengths(vectors: Array) -> Array:
     return np.sqrt(square)
 
 
+def dot(a: Array, b: Array) -> Array:
+    """Return the scalar products of rows of three, (n,).
+
+    To the last bit what `np.einsum` gives of rows that lie one after the other.
+    """
+    (x, y, z), (u, v, w) = a.T, b.T
+    return x * u + z * w + y * v
+
+
+def by_column(vectors: Array, chosen: Ints) -> Array:
+    """Return some vectors, (k, 3), that lie in memory column by column.
+
+    Rows of three are too short for numpy's loops.
+    """
+    return vectors.T.take(chosen, axis=1).T
+
+
 def rows_of(array: NDArray[_Kind], chosen: Ints | Mask) -> NDArray[_Kind]:
     """Return some rows, by index or mask: up to ten times as fast as `array[chosen]`.
 

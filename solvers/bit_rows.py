@@ -64,7 +64,7 @@ def sparse_rows(dense: NDArray[np.bool_]) -> sparse.csr_array:
 def unpack_rows(rows: NDArray[np.uint64], n_rows: int) -> NDArray[np.bool_]:
     """Return the matrix, shape (n_cells, n_rows), of a few bit rows."""
     whole = np.ascontiguousarray(rows)
-    return np.unpackbits(whole.view(np.uint8), axis=1, count=n_rows).astype(bool)
+    return np.unpackbits(whole.view(np.uint8), axis=1, count=n_rows).view(np.bool_)
 
 
 def exceeds(

@@ -191,8 +191,7 @@ def cells_within(directions: Array, angles: Array, n: int) -> tuple[Ints, Mask]:
 def _placed(directions: Array) -> tuple[Ints, Array, Array]:
     """Return the face of each direction, and its gnomonic x and y there, (m,) each."""
     # Column by column: rows of three are too short for numpy's loops.
-    flat = np.ascontiguousarray(directions, dtype=np.float64).ravel()
-    x, y, z = (np.ascontiguousarray(flat[k::3]) for k in range(3))
+    x, y, z = np.ascontiguousarray(directions.T, dtype=np.float64)
     of_x, of_y, of_z = np.abs(x), np.abs(y), np.abs(z)
     first = (of_x >= of_y) & (of_x >= of_z)
     second = ~first & (of_y >= of_z)

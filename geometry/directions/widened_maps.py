@@ -8,7 +8,7 @@ map those that it meets are looked at, four at most, unless it leaves its face.
 
 import numpy as np
 
-from geometry.arrays import Array, Ints, Mask, Words
+from geometry.arrays import Array, Ints, Mask, Words, by_column
 
 from .cube_map import FACES, CubeMap, cells_within, cube_map, located
 
@@ -45,25 +45,35 @@ class WidenedMaps:
         self._rows = np.concatenate(made).view(np.uint8)
         self._first = np.cumsum([len(maps) for maps in made[:-1]])
 
-    def open(self, directions: Array, angles: Array, samples: Ints) -> Mask:
-        """Return whether samples (m,) have an open direction near to one given, (m,).
+    def places(self, directions: Array, angles: Array) -> Ints:
+        """Return where any maps of as many cells answer for directions, (m,).
 
         Directions (m, 3) have any length, but 0 only if no map answers; angles (m,) say
-        in [rad] how near. More may be called open than is, never less.
+        in [rad] how near. Beyond the widest map's angle anything may be open: -1.
         """
         level = np.searchsorted(self._angles, angles)
-        answer = np.ones(len(angles), dtype=bool)
-        # Beyond the widest map's angle anything may be open.
         some = np.flatnonzero(level < self._angles.size)
-        level, sample = level[some], samples[some]
-        towards = directions.take(some, axis=0)
-        cell = self._first[level] + located(towards, self._cells[level])
-        answer[some] = self._bits(cell, sample)
+        places, level = np.full(len(angles), -1), level[some]
+        cells = located(by_column(directions, some), self._cells[level])
+        places[some] = self._first[level] + cells
+        return places
+
+    def open(
+        self, directions: Array, angles: Array, samples: Ints, places: Ints
+    ) -> Mask:
+        """Return whether samples (m,) have an open direction near to one given, (m,).
+
+        Directions and angles are those of `places`. More may be called open than is,
+        never less.
+        """
+        answer = self._bits(places, samples) | (places < 0)
         # What may yet be closed by a closer look.
-        near = np.flatnonzero(answer[some] & (level == 0))
-        if near.size:
-            small = some[near]
-            four, do = cells_within(towards[near], angles[small], int(self._cells[0]))
+        near = (places >= 0) & (places < self._first[1])
+        small = np.flatnonzero(answer & near)
+        if small.size:
+            four, do = cells_within(
+                by_column(directions, small), angles[small], int(self._cells[0])
+            )
             small, four = small[do], four[do]
             answer[small] = False
             for cells in four.T:

@@ -15,7 +15,7 @@ from planning.model.devices.bodies import Box
 from planning.proofs import projector_bound as continuous
 from planning.proofs.all_poses import BoundQuestion, Effort
 from planning.proofs.cells.direction_cells import DirectionTree
-from planning.proofs.cells.position_cells import PositionTree
+from planning.proofs.cells.lit_cells import LitCells
 from planning.proofs.projector_bound import DEFAULT, bound_projectors
 from planning.rig.rig import load_rig
 from planning.scene.draws import Draw
@@ -415,9 +415,13 @@ def test_what_is_sure_of_a_cell_changes_no_row_of_its_parts(monkeypatch):
         return np.concatenate(layers), tree.units - before
 
     quick, little = cells()
-    monkeypatch.setattr(
-        PositionTree, "_certain", lambda _, seen, k: np.zeros(k.size, bool)
-    )
+    admitted = LitCells.admitted
+
+    def never_sure(cells, samples, *seen):
+        may, surely = admitted(cells, samples, *seen)
+        return may, np.zeros_like(surely)
+
+    monkeypatch.setattr(LitCells, "admitted", never_sure)
     plain, much = cells()
     np.testing.assert_array_equal(quick, plain)
     assert little < much

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.arrays import lengths
+from geometry.arrays import by_column, dot, lengths
 from planning.model.requirements import TriangulationLimits
 from planning.scene.codes.surfaces import CodedPixels, CodeSurfaces
 from planning.scene.limits.calibration_terms import surface_deviation
@@ -42,7 +42,8 @@ class Cone:
 
     def take(self, at: _Index) -> "Cone":
         """Return some of the cones."""
-        return Cone(self.towards[at], self.psi[at], self.cosine[at], self.sine[at])
+        towards = by_column(self.towards, at)
+        return Cone(towards, self.psi[at], self.cosine[at], self.sine[at])
 
 
 class RingCrossings:
@@ -154,8 +155,3 @@ def _least_sine(c: _Array, cone: Cone) -> _Array:
     s = np.sqrt(np.maximum(1.0 - c * c, 0.0))
     off = np.maximum(s * cone.cosine - c * cone.sine, 0.0)
     return np.where(c >= cone.cosine, 0.0, off)
-
-
-def dot(a: _Array, b: _Array) -> _Array:
-    """Return the scalar products of rows, (n,)."""
-    return np.einsum("ij,ij->i", a, b)

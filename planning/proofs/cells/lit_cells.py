@@ -13,12 +13,13 @@ small the cell. Beam and aim are left out, which only adds samples.
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import by_column, dot
 from planning.model.requirements import ProjectorLimits
 from planning.scene.limits.limit import may_hold
 from planning.scene.limits.projector_limits import PROJECTOR_LIMITS, LightCell
 from planning.scene.samples import Target
 
-from .crossings import Cone, dot, farthest_cos, nearest_cos
+from .crossings import Cone, farthest_cos, nearest_cos
 
 _Array = NDArray[np.float64]
 
@@ -38,24 +39,21 @@ class LitCells:
         psi: _Array,
     ) -> NDArray[np.bool_]:
         """Return which samples a projector in a cell may light, as `CellLimits`."""
-        cone, facing, along = self._cosines(samples, towards, psi)
-        best = LightCell(nearest_cos(facing, cone), farthest_cos(along, cone))
-        return may_hold(PROJECTOR_LIMITS, best, self._limits, len(samples))
+        return self.admitted(samples, towards, psi)[0]
 
-    def surely(
+    def admitted(
         self, samples: NDArray[np.int64], towards: _Array, psi: _Array
-    ) -> NDArray[np.bool_]:
-        """Return which samples every part of a cell admits, likewise."""
-        cone, facing, along = self._cosines(samples, towards, psi)
+    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return the same, and which samples every part of a cell admits."""
+        cone = Cone.of(towards, psi)
+        facing = dot(by_column(self._normals, samples), towards)
+        facing = np.clip(facing, -1.0, 1.0)
+        along = np.abs(dot(by_column(self._steep, samples), towards))
+        best = LightCell(nearest_cos(facing, cone), farthest_cos(along, cone))
         least = facing * cone.cosine - np.sqrt(1.0 - facing**2) * cone.sine
         worst = LightCell(least, nearest_cos(along, cone))
-        holds = may_hold(PROJECTOR_LIMITS, worst, self._limits, len(samples))
-        return holds & (psi < 0.5 * np.pi)
-
-    def _cosines(
-        self, samples: NDArray[np.int64], towards: _Array, psi: _Array
-    ) -> tuple[Cone, _Array, _Array]:
-        """Return the cones about directions, and N.u and |T1.u| of their middles."""
-        facing = np.clip(dot(self._normals[samples], towards), -1.0, 1.0)
-        along = np.abs(dot(self._steep[samples], towards))
-        return Cone.of(towards, psi), facing, along
+        may, surely = (
+            may_hold(PROJECTOR_LIMITS, light, self._limits, len(samples))
+            for light in (best, worst)
+        )
+        return may, surely & (psi < 0.5 * np.pi)

@@ -24,6 +24,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import by_column, dot
 from geometry.devices import PinholeModel
 from planning.model.requirements import Requirements
 from planning.scene.codes.surfaces import CodedPixels
@@ -32,7 +33,7 @@ from planning.scene.limits.limit import may_hold
 from planning.scene.limits.pair_limits import PAIR_LIMITS
 from planning.scene.measuring.measured import LitSamples
 
-from .crossings import Cone, PixelCrossings, RingCrossings, dot, nearest_cos
+from .crossings import Cone, PixelCrossings, RingCrossings, nearest_cos
 from .image_cone import ImageCone, image_cone
 
 _Array = NDArray[np.float64]
@@ -89,7 +90,7 @@ class MeasurableCells:
         """Return which samples a camera in a cell may measure, as `CellLimits`."""
         self._check_cancelled()
         cone = Cone.of(towards, psi)
-        facing = nearest_cos(dot(self._normals[samples], towards), cone)
+        facing = nearest_cos(dot(by_column(self._normals, samples), towards), cone)
         admitted = np.zeros(samples.size, dtype=bool)
         for lens in self._lenses:
             depth = nearest * np.cos(lens.image.off_axis)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import by_column
 from geometry.directions.cube_map import FACES, circles, middles, widest
 from geometry.directions.widened_maps import WidenedMaps
 from planning.model.requirements import Workspace
@@ -105,14 +106,15 @@ class PositionTree(GrownTree):
         admissible = self._admissible(cells, facing)[:, None]
         sure = sure & admissible
         covered = sure.copy()
-        at, samples = np.nonzero(may & ~sure & admissible)
-        for pairs in parts(at.size, PAIRS):
-            cell, sample = at[pairs], samples[pairs]
+        # Numpy finds what isn't zero in one dimension five times as fast as in two.
+        asked = np.flatnonzero(may & ~sure & admissible)
+        for some in parts(asked.size, PAIRS):
+            pairs = asked[some]
+            cell, sample = np.divmod(pairs, self.n_rows)
             seen = self.seen_from(cells, facing, cell, sample)
-            passed = self._passed(seen, sample)
-            covered[cell[passed], sample[passed]] = True
-            certain = passed[self._certain(seen.take(passed), sample[passed])]
-            sure[cell[certain], sample[certain]] = True
+            passed, certain = self._passed(seen, sample)
+            covered.reshape(-1)[pairs[passed]] = True
+            sure.reshape(-1)[pairs[passed[certain]]] = True
         return covered, sure
 
     def widths(self, names: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -135,41 +137,44 @@ class PositionTree(GrownTree):
         samples: NDArray[np.int64],
     ) -> Seen:
         """Return how samples see cells; `facing` is that of all of these."""
-        return seen_from(cells, facing, at, self._points[samples])
+        return seen_from(cells, facing, at, by_column(self._points, samples))
 
-    def _passed(self, seen: Seen, samples: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the pairs of cell and sample that a device in the cell may cover."""
-        near, far = self._range
-        ranged = seen.distance - seen.extent <= far
-        pairs = np.flatnonzero(ranged & (seen.distance + seen.extent >= near))
-        if self._limits is not None:
-            view = seen.take(pairs)
-            nearest = np.maximum(view.distance - view.extent, 0.0)
-            pairs = pairs[
-                self._limits.admits(samples[pairs], view.towards, nearest, view.psi)
-            ]
-        if self._maps is not None:
-            view = seen.take(pairs)
-            pairs = pairs[self._maps.open(view.towards, view.psi, samples[pairs])]
-        return pairs
+    def _passed(
+        self, seen: Seen, samples: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Return the pairs of cell and sample that a device in the cell may cover.
 
-    def _certain(self, seen: Seen, samples: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Return of which pairs no part of the cell would be found to miss the sample.
-
-        Of cameras that isn't asked.
+        And of which no part of the cell would be found to miss the sample, as far as
+        that is known; of cameras that isn't asked.
         """
         near, far = self._range
-        if self._closed is None or not isinstance(self._limits, LitCells):
-            return np.zeros(samples.size, dtype=bool)
-        within = (seen.distance - seen.extent >= near) & (
-            seen.distance + seen.extent <= far
-        )
-        within &= self._limits.surely(samples, seen.towards, seen.psi)
-        some = np.flatnonzero(within)
-        within[some] = ~self._closed.open(
-            seen.towards[some], seen.psi[some], samples[some]
-        )
-        return within
+        nearest, farthest = seen.distance - seen.extent, seen.distance + seen.extent
+        pairs = np.flatnonzero((nearest <= far) & (farthest >= near))
+        sure = (nearest >= near) & (farthest <= far)
+        sure &= self._closed is not None and isinstance(self._limits, LitCells)
+        if isinstance(self._limits, LitCells):
+            view = seen.take(pairs)
+            may, surely = self._limits.admitted(samples[pairs], view.towards, view.psi)
+            sure[pairs] &= surely
+            pairs = pairs[may]
+        elif self._limits is not None:
+            view = seen.take(pairs)
+            least = np.maximum(nearest[pairs], 0.0)
+            may = self._limits.admits(samples[pairs], view.towards, least, view.psi)
+            pairs = pairs[may]
+        if self._maps is None:
+            return pairs, sure[pairs]
+        view = seen.take(pairs)
+        places = self._maps.places(view.towards, view.psi)
+        passed = self._maps.open(view.towards, view.psi, samples[pairs], places)
+        some = np.flatnonzero(passed & sure[pairs])
+        if self._closed is not None and some.size:
+            view = view.take(some)
+            sure[pairs[some]] = ~self._closed.open(
+                view.towards, view.psi, samples[pairs[some]], places[some]
+            )
+        pairs = pairs[passed]
+        return pairs, sure[pairs]
 
     def _admissible(self, cells: ShellCells, facing: Facing) -> NDArray[np.bool_]:
         """Return which cells may hold a position that all limits allow, shape (n,)."""

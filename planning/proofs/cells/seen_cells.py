@@ -10,13 +10,14 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import by_column, dot
 from geometry.devices import PinholeModel
 from planning.model.requirements import Requirements
 from planning.scene.limits.camera_limits import CAMERA_LIMITS, CellView
 from planning.scene.limits.limit import may_hold
 from planning.scene.samples import Target
 
-from .crossings import Cone, dot, nearest_cos
+from .crossings import Cone, nearest_cos
 from .image_cone import image_cone
 
 _Array = NDArray[np.float64]
@@ -46,7 +47,7 @@ class SeenCells:
     ) -> NDArray[np.bool_]:
         """Return which samples a camera in a cell may see, as `CellLimits`."""
         self._check_cancelled()
-        middle = dot(self._normals[samples], towards)
+        middle = dot(by_column(self._normals, samples), towards)
         facing = nearest_cos(middle, Cone.of(towards, psi))
         admitted = np.zeros(samples.size, dtype=bool)
         for off_axis, focal_px in self._lenses:

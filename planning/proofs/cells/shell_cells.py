@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.arrays import lengths
+from geometry.arrays import by_column, dot, lengths
 from geometry.directions.cube_map import quarters
 
 _ROUNDING = 1e-9
@@ -74,7 +74,8 @@ class Seen(NamedTuple):
 
     def take(self, chosen: NDArray[np.int64]) -> "Seen":
         """Return the chosen pairs."""
-        return Seen(*(column[chosen] for column in self))
+        towards, *others = self
+        return Seen(by_column(towards, chosen), *(each[chosen] for each in others))
 
 
 def seen_from(
@@ -92,9 +93,9 @@ def seen_from(
     outwards, radii = directions
     side = 2.0 * cells.high_m * np.sin(0.5 * radii)
     middle = 0.5 * (cells.low_m + cells.high_m)[:, None] * outwards
-    towards = middle[at] - points
+    towards = by_column(middle, at) - points
     distance = lengths(towards)
-    psi = spread(towards, distance, outwards[at], half[at], side[at])
+    psi = spread(towards, distance, by_column(outwards, at), half[at], side[at])
     # A point in the middle of a cell has no direction; any is open to it there.
     towards /= np.where(distance > 0.0, distance, 1.0)[:, None]
     return Seen(towards, distance, (half + side + _ROUNDING)[at], psi)
@@ -108,7 +109,7 @@ def spread(
     side: NDArray[np.float64] | float,
 ) -> NDArray[np.float64]:
     """Return psi of a cell for each sample, shape (n,)."""
-    along = np.einsum("ij,ij->i", towards, np.broadcast_to(outwards, towards.shape))
+    along = dot(towards, outwards)
     across = np.sqrt(np.maximum(distance**2 - along**2, 0.0))
     # The end of the interval that lies nearer turns by more.
     turn = np.arctan2(half * across, distance**2 - half * np.abs(along))
