@@ -74,11 +74,14 @@ class MultiplierProgram:
 
     def add(self, poses: NDArray[np.int64], serves: NDArray[np.bool_]) -> None:
         """Take poses in hand, with their rows as a matrix (n, n_rows)."""
-        infinity = self._highs.kHighsInf
-        for row in serves[:, self._live]:
-            places = np.append(np.flatnonzero(row), self._live.size).astype(np.int32)
-            values = np.append(self._costs[row], -1.0)
-            self._solver.addRow(-infinity, 0.0, places.size, places, values)
+        n, ones = len(poses), np.ones((len(poses), 1), dtype=bool)
+        row, column = np.nonzero(np.hstack([serves[:, self._live], ones]))
+        starts = np.searchsorted(row, np.arange(n)).astype(np.int32)
+        values = np.append(self._costs, -1.0)[column]
+        below = np.full(n, -self._highs.kHighsInf)
+        self._solver.addRows(
+            n, below, np.zeros(n), row.size, starts, column.astype(np.int32), values
+        )
         self.poses = np.concatenate([self.poses, poses])
 
     def solve(self) -> Proposal | None:
