@@ -256,7 +256,7 @@ def _directions(level: Ints, cells: Ints, down: float, across: float) -> Array:
         np.tan(0.5 * np.pi * ((k + s) / n - 0.5)) for k, s in ((i, across), (j, down))
     )
     unit = 1.0 / np.sqrt(1.0 + x * x + y * y)
-    directions = np.empty((cells.size, 3))
+    directions = np.empty((cells.size, 3), order="F")
     of = np.arange(cells.size)
     for axis, value in zip(_AXES[face].T, (x, y, _SIGNS[face]), strict=True):
         directions[of, axis] = value * unit

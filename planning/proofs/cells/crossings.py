@@ -56,12 +56,14 @@ class RingCrossings:
         limits: TriangulationLimits,
         squarely: float,
     ) -> None:
-        self._across, self._spacing = rings.normals, rings.spacing
+        self._across = np.asfortranarray(rings.normals)
+        self._spacing = rings.spacing
         placed = surface_deviation(limits.limited_calibration, rings.levers)
         self._placed = np.hypot(placed, limits.ring_sigma_m or 0.0) * squarely
         along = np.cross(normals, self._across)
         self._width = lengths(along)
-        self._along = along / np.where(self._width > 0.0, self._width, 1.0)[:, None]
+        along /= np.where(self._width > 0.0, self._width, 1.0)[:, None]
+        self._along = np.asfortranarray(along)
 
     def best(self, k: _Index, cone: Cone, facing: _Array, turn: _Array) -> PairCell:
         """Return the best of samples k, seen at -N.r of `facing` at most.
@@ -69,8 +71,8 @@ class RingCrossings:
         `turn` is least t |g| / |v| [m].
         """
         u = cone.towards
-        crossing = nearest_cos(np.abs(dot(self._across[k], u)), cone)
-        sine = _least_sine(np.abs(dot(self._along[k], u)), cone)
+        crossing = nearest_cos(np.abs(dot(by_column(self._across, k), u)), cone)
+        sine = _least_sine(np.abs(dot(by_column(self._along, k), u)), cone)
         shift, no_noise = turn * self._width[k] * sine, np.zeros(len(k))
         placed, spacing = self._placed[k], self._spacing[k]
         return PairCell(crossing, facing, shift, no_noise, spacing, placed)
@@ -95,11 +97,12 @@ class PixelCrossings:
     def best(self, k: _Index, cone: Cone, facing: _Array, turn: _Array) -> PairCell:
         """Return the best of samples k, as `RingCrossings` does."""
         u, psi = cone.towards, cone.psi
-        angle = np.arccos(np.clip(-dot(self._beams[k], u), -1.0, 1.0))
+        beams, normals = by_column(self._beams, k), by_column(self._normals, k)
+        angle = np.arccos(np.clip(-dot(beams, u), -1.0, 1.0))
         least, most = np.maximum(angle - psi, 0.0), np.minimum(angle + psi, np.pi)
         middle = np.clip(0.5 * np.pi, least, most)
         crossing = np.sin(middle)
-        turned_off = np.arccos(np.clip(dot(self._normals[k], u), -1.0, 1.0))
+        turned_off = np.arccos(np.clip(dot(normals, u), -1.0, 1.0))
         steepest = np.maximum(np.cos(np.minimum(turned_off + psi, 0.5 * np.pi)), 0.0)
         ratio = steepest / np.maximum(crossing, 1e-12)
         sine = self._sine[k]

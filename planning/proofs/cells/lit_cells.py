@@ -28,7 +28,8 @@ class LitCells:
     """Says which samples light from a cell may meet; the `limits` of its tree."""
 
     def __init__(self, target: Target, limits: ProjectorLimits) -> None:
-        self._normals, self._steep = target.samples.normals, target.steep
+        self._normals = np.asfortranarray(target.samples.normals)
+        self._steep = np.asfortranarray(target.steep)
         self._limits = limits
 
     def admits(

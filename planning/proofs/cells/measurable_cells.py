@@ -61,7 +61,8 @@ class MeasurableCells:
     ) -> None:
         self._check_cancelled = check_cancelled
         self._camera, self._pair = required.camera, required.triangulation
-        self._normals, self._lit = samples.target.samples.normals, samples.lit
+        self._normals = np.asfortranarray(samples.target.samples.normals)
+        self._lit = samples.lit.T
         cosines = np.stack([light.incidence_cos for light in samples.lights])
         errors = self._pair.limited_calibration
         edge = self._pair.noise_px / np.maximum(cosines, 1e-9)
@@ -98,9 +99,10 @@ class MeasurableCells:
             seen = may_hold(CAMERA_LIMITS, cell, self._camera, len(samples))
             turn = nearest * lens.image.least_turn
             for p, crossing in enumerate(self._crossings):
-                at = np.flatnonzero(self._lit[samples, p] & seen & ~admitted)
+                lit = self._lit[p].take(samples)
+                at = np.flatnonzero(lit & seen & ~admitted)
                 k = samples[at]
                 pair = crossing.best(k, cone.take(at), facing[at], turn[at])
-                pair = replace(pair, noise=lens.noise_px[p, k])
+                pair = replace(pair, noise=lens.noise_px[p].take(k))
                 admitted[at] = may_hold(PAIR_LIMITS, pair, self._pair, len(k))
         return admitted

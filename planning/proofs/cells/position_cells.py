@@ -58,7 +58,7 @@ class PositionTree(GrownTree):
         limits: CellLimits | None = None,
     ) -> None:
         self._workspace, self._range = workspace, range_m
-        self._points = points - np.array(workspace.centre)
+        self._points = np.asfortranarray(points - np.array(workspace.centre))
         self._reach = float(np.linalg.norm(self._points, axis=1).max(initial=0.0))
         self._maps, self._closed = maps, closed
         self._finest, self._limits = finest, limits
