@@ -179,7 +179,7 @@ def pieces(marks: Mask, n: int) -> Pieces:
     """
     flat = np.ascontiguousarray(marks).ravel()
     # All cells as one row first: rows are too short for numpy's loops.
-    begins, ends = flat.copy(), flat.copy()
+    begins, ends = np.empty_like(flat), np.empty_like(flat)
     np.greater(flat[1:], flat[:-1], out=begins[1:])
     np.greater(flat[:-1], flat[1:], out=ends[:-1])
     begins[::n] = flat[::n]

@@ -36,8 +36,8 @@ _SINGLE = 1e-4
 _SLACKS = 16.0
 # How near, in shares of the mesh's size, faces are that are looked at alone.
 _NEAR = (0.01, 0.03, 0.1)
-# Samples whose caps are laid over all cells at a time: they stay in the cache.
-_CAPS = 4
+# Cells over which caps of samples are laid at a time: they stay in the cache.
+_CAPS = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class OpenDirections:
         is unit T1, or zero where it doesn't bind; (n, 3) each.
         """
         cells = self._within_incidence(normals)
-        cells &= ~self._along_steep(steep)
+        cells = np.greater(cells, self._along_steep(steep))
         if self._edges is not None:
             # Rays leave out what is within the slack of a sample, as the planner's do.
             slack = _SLACKS * self._visibility.slack
@@ -101,7 +101,7 @@ class OpenDirections:
                 if reach < np.inf:
                     among = close = self._edges.faces_within(sides, reach)
                 crossing = self._edges.seen_from(sides, self._cone, among)
-                asked = cells & ~blocked
+                asked = np.greater(cells, blocked)
                 blocked |= self._blocked(crossing, points, normals, asked, reach)
             doubtful = self._edges.touched(sides, faces, slack, self._cone, close)
             doubtful |= self._narrow[faces]
@@ -114,11 +114,11 @@ class OpenDirections:
         within = np.empty((len(normals), cube.size), dtype=bool)
         near = np.empty_like(within)
         reached = np.cos(np.minimum(limit + cube.radii, np.pi))
-        for part in equal_parts(len(normals), _CAPS):
+        for part in equal_parts(len(normals), _at_once(cube)):
             cosine = normals[part] @ cube.centres.T
             within[part] = cosine >= np.cos(limit)
             near[part] = cosine >= reached
-        near &= ~within
+        near = np.greater(near, within)
         row, cell = np.divmod(np.flatnonzero(near), cube.size)
         meets = _arcs_come_within(cube, normals[row], cell, np.cos(limit) - _ROUNDING)
         within[row[meets], cell[meets]] = True
@@ -131,7 +131,7 @@ class OpenDirections:
         least = np.cos(self._limits.min_tangent_angle) + _ROUNDING
         whole = np.zeros((len(steep), 6, n, n), dtype=bool)
         corners = cube.corners.reshape(-1, 3).T
-        for part in equal_parts(len(steep), _CAPS):
+        for part in equal_parts(len(steep), _at_once(cube)):
             cosine = (steep[part] @ corners).reshape(-1, 6, n + 1, n + 1)
             for inside in (cosine > least, cosine < -least):
                 pairs = inside[:, :, :-1] & inside[:, :, 1:]
@@ -155,7 +155,7 @@ class OpenDirections:
             # Silhouettes below the horizon weren't asked for: nothing hangs together
             # across it.
             touched |= normals @ cube.centres.T <= np.sin(cube.radii)
-        joined = pieces(cells & ~touched, cube.n)
+        joined = pieces(np.greater(cells, touched), cube.n)
         row, cell = np.divmod(joined.first, cube.size)
         answer = self._meets(points[row], normals[row], cube.centres[cell], reach)
         return joined.cells(answer)
@@ -179,6 +179,10 @@ class OpenDirections:
         for part in equal_parts(len(points), CHUNK):
             met[part] = caster.blocked_local(local[part], along[part], rest[part])
         return up & met
+
+
+def _at_once(cube: CubeMap) -> int:
+    return max(1, _CAPS // cube.size)
 
 
 def _arcs_come_within(cube: CubeMap, axes: Array, cells: Ints, cosine: float) -> Mask:

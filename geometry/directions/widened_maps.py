@@ -82,8 +82,8 @@ class WidenedMaps:
 
     def _bits(self, cells: Ints, samples: Ints) -> Mask:
         """Return the bit of each pair of row and sample, (m,)."""
-        byte = cells * self._rows.shape[1] + samples // 8
-        bits = self._rows.ravel().take(byte) >> (7 - samples % 8).astype(np.uint8)
+        byte = cells * self._rows.shape[1] + (samples >> 3)
+        bits = self._rows.ravel().take(byte) >> (~samples & 7).astype(np.uint8)
         return (bits & 1).view(np.bool_)
 
 
