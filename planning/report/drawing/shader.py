@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from geometry.arrays import rows_of
 from geometry.mesh.tensors import summed, unit
-from geometry.rays.rays import RayCaster
+from geometry.rays.rays import CHUNK, RayCaster, equal_parts
 
 from .picture_view import BACKGROUND, PictureView
 
@@ -38,8 +39,11 @@ class Shader:
         high = np.clip(np.ceil(pixels.max(axis=0)) + 1, 0, view.size).astype(int)
         columns, rows = np.meshgrid(*map(np.arange, low, high))
         columns, rows = columns.ravel(), rows.ravel()
-        colours, hit = self._rays(view, columns, rows)
-        picture[rows[hit], columns[hit]] = colours
+        # In parts, so that what is between stays in the cache.
+        for part in equal_parts(len(columns), CHUNK):
+            across, down = columns[part], rows[part]
+            colours, hit = self._rays(view, across, down)
+            picture[down[hit], across[hit]] = colours
         return Image.fromarray(picture)
 
     def _rays(
@@ -61,7 +65,8 @@ class Shader:
         # The back of an open surface is lit like its front.
         normals *= np.where(normals @ back < 0.0, -1.0, 1.0)[:, None]
         light = _brightness(normals, view)
-        colours = np.clip(self.colours[faces[hit]] * light[:, None], 0.0, 255.0)
+        clay = rows_of(self.colours, faces[hit])
+        colours = np.clip(clay * light[:, None], 0.0, 255.0)
         return colours.astype(np.uint8), hit
 
     def _normals(
@@ -69,9 +74,13 @@ class Shader:
     ) -> NDArray[np.float64]:
         """Unit normals at points of faces, interpolated between the faces' corners."""
         from_a = points - self.caster.mesh.corners[faces, 0]
-        b, c = (np.einsum("ij,ij->i", slope[faces], from_a) for slope in self._slopes)
+        b, c = (
+            np.einsum("ij,ij->i", rows_of(slope, faces), from_a)
+            for slope in self._slopes
+        )
         weights = np.stack([1.0 - b - c, b, c], axis=1)
-        return unit(np.einsum("nk,nkj->nj", weights, self._corner_normals[faces]))
+        corners = rows_of(self._corner_normals, faces)
+        return unit(np.einsum("nk,nkj->nj", weights, corners))
 
     @cached_property
     def _slopes(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -31,8 +31,10 @@ def _covered(triangles: Array) -> Mask:
     picture = Image.new("1", (columns, rows))
     draw = ImageDraw.Draw(picture)
     # A pixel's middle is at whole numbers there.
-    for corners in places[np.ptp(places, axis=1).max(axis=1) > 2.0] - 0.5:
-        draw.polygon([*map(tuple, corners.tolist())], fill=1, outline=1)
+    a, b, c = places.transpose(1, 2, 0)
+    wide = np.maximum(np.maximum(a, b), c) - np.minimum(np.minimum(a, b), c)
+    for corners in places[np.maximum(*wide) > 2.0].reshape(-1, 6) - 0.5:
+        draw.polygon(corners.tolist(), fill=1)
     cells = np.array(picture)
     # A smaller one lies in the cells of its corners and the middles of its sides.
     for points in (places, 0.5 * (places + np.roll(places, 1, axis=1))):
