@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from geometry.mesh.sampling import SurfaceSamples
 from geometry.parallel import abandonable, n_threads
 from planning.model.errors import InputError, PlanningError
 from planning.model.plan import RigPlan
-from planning.verify.audit.audit import audited
+from planning.verify.audit.audit import Audit, audited
 from planning.verify.audit.audit_case import AuditCase, examine
 from planning.verify.audit.audit_samples import AuditSamples
 from planning.verify.audit.coverage.prediction import possible_at_floors
@@ -130,12 +131,20 @@ def verify_plan(
     how = {"photometry": photometry, "physics": physics}
     pixels, unrendered = None, ()
     # Pixels need what was recomputed, and no claim.
+    drawn = Event()
     with abandonable(1) as pool:
         told = say if over_poses else None
-        auditing = pool.submit(audited, case, proofs=proofs, over_poses=told)
+        auditing = pool.submit(
+            _audited_after, drawn, case, proofs=proofs, over_poses=told
+        )
         try:
-            if check_pixels:
-                pixels = _reconstruct(plan, case, truth, other, seed, threads, say, how)
+            try:
+                if check_pixels:
+                    pixels = _reconstruct(
+                        *(plan, case, truth, other, seed, threads, say, how, drawn)
+                    )
+            finally:
+                drawn.set()
         except Exception as error:
             # Of a plan without meaning, or with false claims, that is said, and not how
             # it can't be rendered.
@@ -176,6 +185,12 @@ def verify_plan(
         compared=figures_held,
         trusted=taken_on_trust(plan, mesh, claims_held, figures_held, audit.over_poses),
     )
+
+
+def _audited_after(turn: Event, case: AuditCase, **how: Any) -> Audit:  # noqa: ANN401
+    """Audit a case when its turn comes."""
+    turn.wait()
+    return audited(case, **how)
 
 
 def _verify_family(
@@ -229,7 +244,12 @@ def _reconstruct(
     threads: int,
     say: Callable[[str], None],
     how: Mapping[str, Any],
+    drawn: Event,
 ) -> Reconstruction:
+    """Measure through pixels; tell when a thread has no pair left to draw.
+
+    What comes then takes one thread.
+    """
     if plan.cameras_alone and how["physics"] is not None:
         raise InputError(
             "physics is of light that projectors show, and this plan's pattern is "
@@ -241,11 +261,17 @@ def _reconstruct(
     believed = Scanner.of(plan)
     samples = bare(case.samples)
     expected = Expected(samples, case.actual.measured, case.actual.by_pair)
-    told = countdown(
+    count = countdown(
         lambda line: say(f"pixels: {line}"),
         n_cameras=len(believed.cameras),
         threads=threads,
     )
+
+    def told(done: int, n: int) -> None:
+        if n - done < threads:
+            drawn.set()
+        count(done, n)
+
     if plan.cameras_alone:
         space = plan.requirements.workspace
         pixels = reconstruct_views(
