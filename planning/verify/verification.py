@@ -132,6 +132,9 @@ def verify_plan(
     pixels, unrendered = None, ()
     # Pixels need what was recomputed, and no claim.
     drawn = Event()
+    if proofs:
+        # They take longer than what a thread is left for.
+        drawn.set()
     with abandonable(1) as pool:
         told = say if over_poses else None
         auditing = pool.submit(
