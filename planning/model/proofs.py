@@ -43,8 +43,9 @@ _OF_POSES: _Fields = {
 }
 
 
-# They take eight times their size when they are checked.
-_MOST_MULTIPLIERS = 1 << 27
+# They take eight times their size when they are checked, and what they pay as much for
+# each candidate; each node takes a look at all candidates. We write half as many.
+_MOST_NUMBERS, _MOST_MULTIPLIERS, _MOST_NODES = 1 << 27, 1 << 12, 400_000
 
 
 def sizes_of(draws: Ints) -> Ints:
@@ -90,8 +91,9 @@ class CoverProof:
             and self.draws.shape[1:] == (3,)
             and self.multipliers.shape[1:] == (n,)
             # A leaf names one; so many more are no file of ours.
-            and len(self.multipliers) <= len(self.nodes)
-            and self.multipliers.size <= _MOST_MULTIPLIERS
+            and len(self.multipliers) <= min(len(self.nodes), _MOST_MULTIPLIERS)
+            and len(self.nodes) <= _MOST_NODES
+            and self.multipliers.size <= _MOST_NUMBERS
             and bool(np.all(np.isfinite(self.points)))
             and bool(np.all((self.stand_in >= 0) & (self.stand_in < m)))
             and bool(np.all((self.groups >= 0) & (self.groups < m)))

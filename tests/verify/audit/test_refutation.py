@@ -1,5 +1,6 @@
 """Certificates that so many sets are too few, against all selections looked at."""
 
+import time
 from dataclasses import replace
 from itertools import product
 
@@ -68,6 +69,32 @@ def test_sets_that_stand_for_many_are_all_counted_where_more_may_be_taken() -> N
     for required in (60, 90):
         with pytest.raises(RefutedProofError, match=r"may cover 90\.0 samples"):
             refute(covers, forged, required)
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_a_tree_that_only_branches_ends_soon(closed: bool) -> None:
+    """Of a set each, so that groups are many; or of one set, closed again and again."""
+    n = 3000
+    covers = np.zeros((250, n), dtype=bool)
+    covers[0] = True
+    leaf = certificate(random_cover(0), 4, best_of(random_cover(0), 4) + 1)
+    assert leaf is not None
+    branches = 100_000 if closed else n
+    tree = replace(
+        leaf,
+        points=np.zeros((250, 3)),
+        faces=np.zeros(250, dtype=np.int64),
+        n_sets=2**62,
+        stand_in=np.arange(n),
+        multipliers=np.zeros((1, 250), dtype=np.uint8),
+        nodes=np.full(branches, CoverProof.BRANCH),
+        groups=np.zeros(branches, np.int64) if closed else np.arange(n),
+        group_ends=np.arange(1, branches + 1),
+    )
+    begun = time.process_time()
+    with pytest.raises(RefutedProofError, match="parts"):
+        refute(covers, tree, 1)
+    assert time.process_time() - begun < 20.0
 
 
 def test_no_edit_lets_what_is_false_pass() -> None:

@@ -20,6 +20,8 @@ from planning.model.proofs import CoverProof
 
 # Sums in single precision are exact up to here; more samples go in double precision.
 _EXACT = 1 << 24
+# Parts that wait, times sets: trees that we write have a few hundred of them.
+_MOST_WAITING = 50_000_000
 
 
 class RefutedProofError(Exception):
@@ -28,10 +30,17 @@ class RefutedProofError(Exception):
 
 @dataclass(eq=False)
 class _Node:
-    """Selections that take none of what is closed, and one or more of each group."""
+    """Selections that take none of what is closed, and one or more of each group.
+
+    Attributes:
+        closed: Whether each set is, (m,).
+        group: Number of the group that each set is of, -1: of none, (m,).
+        n_groups: How many there are, of which some may be empty.
+    """
 
     closed: Mask
-    groups: list[Ints]
+    group: Ints
+    n_groups: int
 
 
 def refute(covers: Mask, proof: CoverProof, required: int) -> None:
@@ -88,12 +97,15 @@ class _Tree:
         Raises:
             RefutedProofError: If one is open, or the tree isn't whole.
         """
-        waiting = [_Node(np.zeros(len(self.sets), dtype=bool), [])]
+        n = len(self.sets)
+        waiting = [_Node(np.zeros(n, dtype=bool), np.full(n, -1), 0)]
         branches = iter(self.groups)
         for code in self.proof.nodes.tolist():
             if not waiting:
                 raise RefutedProofError("nodes are left over")
             node = waiting.pop()
+            if len(waiting) * n > _MOST_WAITING:
+                raise RefutedProofError(f"{len(waiting)} parts wait for one")
             if code == self.proof.BRANCH:
                 group = next(branches, None)
                 if group is None:
@@ -113,29 +125,33 @@ class _Tree:
         group = np.searchsorted(self.sets, named)
         if not len(group) or not np.isin(named, self.sets).all():
             raise RefutedProofError("a group is empty, or names none that stands")
-        closed = node.closed.copy()
-        closed[group] = True
-        within = [bool(np.isin(group, other).all()) for other in node.groups]
-        for other, inside in zip(node.groups, within, strict=True):
-            if not inside and np.isin(group, other).any():
-                raise RefutedProofError("two groups have sets in common")
-        kept = [o for o, inside in zip(node.groups, within, strict=True) if not inside]
-        without = [np.setdiff1d(other, group) for other in node.groups]
-        return _Node(node.closed, [*kept, np.unique(group)]), _Node(closed, without)
+        closed, some, none = node.closed.copy(), node.group.copy(), node.group.copy()
+        closed[group], none[group] = True, -1
+        whose, n = node.group[group], node.n_groups
+        within = int(whose[0])
+        if np.any(whose != within):
+            raise RefutedProofError("two groups have sets in common")
+        if within < 0:
+            within, n = n, n + 1
+        # One of a part of a group is one of the group.
+        some[some == within] = -1
+        some[group] = within
+        return _Node(node.closed, some, n), _Node(closed, none, node.n_groups)
 
     def _most(self, node: _Node, code: int) -> float:
         """Return D times what the selections of a leaf cover at most."""
-        spare = self.proof.n_sets - len(node.groups)
-        open_groups = [group[~node.closed[group]] for group in node.groups]
-        if spare < 0 or not all(len(group) for group in open_groups):
+        spare = self.proof.n_sets - node.n_groups
+        members = np.flatnonzero((node.group >= 0) & ~node.closed)
+        if spare < 0 or len(np.unique(node.group[members])) < node.n_groups:
             return 0.0
         if not 0 <= code < len(self.paid):
             raise RefutedProofError(f"there are no multipliers {code}")
-        paid, most = self.paid[code].copy(), float(self.unpaid[code])
-        for group in open_groups:
-            best = group[np.argmax(paid[group])]
-            most += float(paid[best])
-            paid[best] = 0.0
+        paid = self.paid[code].copy()
+        # Group by group, the largest last.
+        members = members[np.lexsort((paid[members], node.group[members]))]
+        best = members[np.diff(node.group[members], append=-1) != 0]
+        most = float(self.unpaid[code]) + float(paid[best].sum())
+        paid[best] = 0.0
         # There may be fewer sets than may be taken: then all of them count.
         dearest = np.sort(np.where(node.closed, 0.0, paid))[::-1]
         return most + float(dearest[:spare].sum())
