@@ -177,6 +177,14 @@ class Surface:
             raise PlanFileError(f"{path}: {error}") from None
 
 
+def _are_characters(names: NDArray[Any]) -> bool:
+    """Whether names (n,) are of characters that there are, no halves of any."""
+    if names.dtype.kind != "U":
+        return False
+    codes = np.frombuffer(names.tobytes(), f"{names.dtype.byteorder}u4")
+    return bool(np.all((codes < 0xD800) | ((codes > 0xDFFF) & (codes < 0x110000))))
+
+
 def _plain(array: NDArray[Any]) -> NDArray[Any]:
     """Return narrower floats, or those of another machine, as ours; others as it is."""
     floats = array.dtype.kind == "f" and np.can_cast(array.dtype, np.float64)
@@ -195,6 +203,7 @@ def _check_arrays(
         fits &= array.dtype.kind in kinds
         # Wider floats are none that linear algebra takes.
         fits &= kinds != "f" or np.can_cast(array.dtype, np.float64)
+        fits &= kinds != "U" or _are_characters(array)
         if not fits or (kinds == "f" and not np.all(np.abs(array) < _LARGEST)):
             floats = f"floats of less than {_LARGEST:g}"
             number = {"f": floats, "iu": "integers", "U": "names"}[kinds]

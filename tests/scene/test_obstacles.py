@@ -339,6 +339,9 @@ def test_one_that_is_called_like_forbidden_ground_is_drawn(planned):
         ("obstacle_vertices", np.full((1, 3), 1e300), r"floats of less than 1e\+09"),
         ("obstacle_vertices", np.zeros((1, 3)), "`obstacle_faces`: face indices span"),
         ("obstacle_names", np.array(["a"] * 9), "`obstacle_faces`: faces must be"),
+        ("obstacle_names", np.array(["a\ud800"]), r"must be \(n\) names, got <U2"),
+        ("obstacle_names", np.array([2**31 - 1], "i4").view("<U1"), "names, got <U1"),
+        ("obstacle_names", np.array([b"a"]), r"names, got \|S1"),
     ],
 )
 def test_broken_arrays_of_obstacles_are_refused(
