@@ -67,7 +67,7 @@ ON_TRUST = {
     "that the run was, or wasn't, cut": ("truncated",),
     "the numbers that survival takes": ("survival.projectors", "survival.cameras"),
     "what planning both kinds together saved": ("joint",),
-    "numbers of heads or steps, and their bounds": ("stations.n_*", "stations.bound"),
+    "numbers of heads or steps, and their bounds": ("stations.count", "stations.steps"),
     "rigs drawn of the plan that isn't robust": (
         "robust.n_*_without",
         "robust.missed_by_without",

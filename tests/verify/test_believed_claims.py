@@ -4,6 +4,7 @@ import re
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from geometry.mesh.mesh import TriangleMesh
@@ -122,6 +123,18 @@ def test_what_no_audit_recomputes_is_named_unless_it_came_out_again(checked, key
 @pytest.mark.parametrize("held", ["", APART, EXACTLY, WHOLLY])
 def test_the_rig_is_the_plans_own_unless_all_was_planned_again(checked, held):
     assert ("--rig FILE" in named(checked, held, EXACTLY)) is (held != WHOLLY)
+
+
+def test_how_many_stations_it_takes_is_told(checked, handmade):
+    count = {"count": 1, "needed": 1, "lower_bound": 1, "n_candidates": 24}
+    count |= {"n_samples": 200, "lit": 180, "measured": 150, "proof": "all looked at"}
+    step = {"id": "T1", "world_from_station": np.eye(4).tolist(), "angle": 0.0}
+    step |= {"projectors": ["P1", "P2"], "cameras": ["C1", "C2"]}
+    told = {"kind": "turntable", "stations": [step], "count": count}
+    stood = handmade.tampered(checked, lambda d: d.update(stations=told))
+    line = "numbers of heads or steps, and their bounds"
+    assert line in named(stood, APART, EXACTLY)
+    assert line not in named(checked, APART, EXACTLY)
 
 
 @pytest.mark.parametrize("turned", [False, True])
