@@ -1,7 +1,7 @@
 """What tables that people write are made of: strict values in stated ranges."""
 
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, TypeVar
 
 import numpy as np
 from pydantic import (
@@ -38,6 +38,9 @@ ShareOrNone = Annotated[
     Field(ge=0.0, le=1.0),
     WithJsonSchema(_SHARE),
 ]
+_Size = TypeVar("_Size", bound=Sequence[int])
+# Of an image: more than any sensor has.
+_MOST_IN_IMAGE = 400_000_000
 Acute = Annotated[float, Field(gt=0.0, lt=90.0)]
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 PositivePair = Annotated[list[Positive], Field(min_length=2, max_length=2)]
@@ -55,6 +58,17 @@ _NO_FIGURES = {"name", "device", "description", "sources", "count", "cost"}
 # larger by far overflow.
 _LARGEST = 1e9
 UpName = Literal["x", "y", "z", "-x", "-y", "-z"]
+
+
+def fits_memory(size: _Size) -> _Size:
+    """Return the width and height of an image, as they are.
+
+    Raises:
+        ValueError: If it has more pixels than any sensor.
+    """
+    if len(size) == 2 and size[0] * size[1] > _MOST_IN_IMAGE:
+        raise ValueError(f"must be {_MOST_IN_IMAGE} pixels at most")
+    return size
 
 
 def _off_is_none(value: object) -> object:

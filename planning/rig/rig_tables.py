@@ -7,7 +7,7 @@ means: `docs/reference/rig-files.md`.
 import math
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from planning.model.devices.bodies import BodyTable, MountTable
 from planning.model.devices.calibration_errors import (
@@ -29,6 +29,7 @@ from planning.model.table_types import (
     ShareOrNone,
     SourcedTable,
     Table,
+    fits_memory,
 )
 
 from .existing_tables import ExistingTable
@@ -45,6 +46,7 @@ MOST_DEVICES, MOST_MODELS = 1_000, 20
 Resolution = Annotated[
     list[Annotated[int, Field(ge=2, le=MOST_PIXELS)]],
     Field(min_length=2, max_length=2),
+    AfterValidator(fits_memory),
 ]
 FocalPercent = Annotated[float, Field(ge=0.0, le=1e2 * MOST_FOCAL)]
 Rate = Annotated[float, Field(ge=1e-3, le=1e6)]

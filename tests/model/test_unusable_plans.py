@@ -51,6 +51,7 @@ def edited(plan, place, value):
         ("regions.0.n_faces", 2**53 + 1, "should be 2^53 in size at most"),
         ("cameras.0.resolution.0", -(2**60), "should be 2^53 in size at most"),
         ("cameras.0.resolution.0", 2**40, "less than or equal to 100000"),
+        ("cameras.0.resolution", [100_000, 4_001], "must be 400000000 pixels at most"),
         ("requirements.coverage", 1e308, "should be 1e+100 in size at most"),
         ("requirements.coverage", -1e308, "should be 1e+100 in size at most"),
         ("regions.0.area_m2", 1e101, "should be 1e+100 in size at most"),

@@ -337,6 +337,7 @@ def test_named_device_replaces_the_presets_device_whole(write):
         ),
         ("throw_ratio = 1.5\n", "focal_mm = 9.0\n", "needs pixel_um"),
         ("[1280, 800]", "[1280, 800, 3]", "resolution_px"),
+        ("[1280, 800]", "[100000, 4001]", "must be 400000000 pixels at most"),
         ("[1280, 800]", "[1280.5, 800]", r"resolution_px\[0\]"),
         ("[300.0, 2000.0]", "[2000.0, 300.0]", "must rise"),
         ("range_mm = [300.0, 2000.0]\n", "", "needs range_mm or"),

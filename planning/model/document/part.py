@@ -9,6 +9,8 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
+from planning.model.table_types import fits_memory
+
 # A number of devices, poses, samples or cells.
 Count = Annotated[int, Field(ge=0)]
 # A length, an area, an error or a share of which a negative one means nothing.
@@ -17,7 +19,7 @@ Vector3 = tuple[float, float, float]
 Interval = tuple[float, float]
 # Of images that fit into memory.
 _Pixels = Annotated[int, Field(ge=1, le=100_000)]
-Resolution = tuple[_Pixels, _Pixels]
+Resolution = Annotated[tuple[_Pixels, _Pixels], AfterValidator(fits_memory)]
 Row4 = tuple[float, float, float, float]
 _Rows3 = tuple[Vector3, Vector3, Vector3]
 
