@@ -16,6 +16,8 @@ from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.scanner import Scanner
 
 _MM = 1e3
+# Points in a leaf of their tree: such a tree answers sooner, and is made sooner.
+_LEAF = 24
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,9 +137,8 @@ def nearest_distance(cloud: Cloud, samples: SurfaceSamples, reach_m: float) -> A
     best = np.full(len(samples), np.inf)
     for camera in np.unique(cloud.camera):
         seen = cloud.camera == camera
-        distance, nearest = KDTree(cloud.points[seen]).query(
-            samples.points, distance_upper_bound=reach_m
-        )
+        tree = KDTree(cloud.points[seen], leafsize=_LEAF, balanced_tree=False)
+        distance, nearest = tree.query(samples.points, distance_upper_bound=reach_m)
         # Where nothing is in reach the index is one past the last point.
         rays = np.concatenate([cloud.rays[seen], np.zeros((1, 3))])[nearest]
         facing = np.einsum("ij,ij->i", rays, samples.normals) < 0.0

@@ -95,7 +95,10 @@ def interreflection(
     rng = np.random.default_rng(_SEED)
     able = rng.permutation(np.flatnonzero(able))
     grid = np.floor(cloud.points[able] / CELL_M).astype(np.int64)
-    _, cell = np.unique(grid, axis=0, return_inverse=True)
+    # Cells are told by one number: rows take several times as long to sort.
+    x, y, z = (grid - grid.min(axis=0, initial=0)).T
+    number = (x * (1 + y.max(initial=0)) + y) * (1 + z.max(initial=0)) + z
+    _, cell = np.unique(number, return_inverse=True)
     asked, cell = able[kept := _first(cell, _POINTS)], cell[kept]
     some = cloud.take(asked)
     bias, doubt = shifts(plan, some, albedo, rng)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from geometry.arrays import rows_of
 from geometry.mesh.mesh import TriangleMesh
 from geometry.rays.rays import CHUNK, RayCaster, equal_parts
 from planning.verify.reconstruction.arrays import Array, Grey, Indices, Mask
@@ -86,13 +87,13 @@ def view(
     fine_rays, fine_faces, fine_distances = _cast(camera, caster, fine, obstacles)
     hit = fine_faces >= 0
     cells = np.concatenate([whole, np.repeat(split, len(_SUB))[hit]])
-    all_rays = np.concatenate([rays[whole], fine_rays[hit]])
+    all_rays = np.concatenate([rows_of(rays, whole), rows_of(fine_rays, hit)])
     all_faces = np.concatenate([faces[whole], fine_faces[hit]])
     reach = np.concatenate([distances[whole], fine_distances[hit]])
     weights = np.ones(len(cells), dtype=np.float32)
     weights[len(whole) :] = 1.0 / len(_SUB)
     points = camera.centre + reach[:, None] * all_rays
-    normals = mesh.face_normals[all_faces]
+    normals = rows_of(mesh.face_normals, all_faces)
     behind = np.einsum("ij,ij->i", all_rays, normals) > 0.0
     normals[behind] *= -1.0
     albedo = photometry.albedo(points)
