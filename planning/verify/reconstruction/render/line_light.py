@@ -6,6 +6,7 @@ A pixel b of light E_b under a Gaussian of standard deviation s gives at u::
 """
 
 import numpy as np
+from scipy.sparse import csr_array
 from scipy.special import ndtr
 
 from planning.verify.reconstruction.arrays import Array, Grey
@@ -58,15 +59,14 @@ def drawn_share(n_pixels: int, places: Array, spread: Array) -> Grey:
 
 def _gathered(padded: Grey, places: Array, spread: Array, half: int) -> Grey:
     """Light at places by so many pixels to either side, dark ones put before."""
-    middle = np.rint(places).astype(np.int64)
-    borders = np.arange(-half, half + 2) - 0.5
-    below = ndtr((borders + (middle - places)[:, None]) / spread[:, None])
-    weights = np.diff(below).astype(np.float32)
+    middle = np.rint(places).astype(np.int32)
+    borders = np.arange(-half, half + 2)[:, None] - 0.5
+    below = ndtr((borders + (middle - places)) / spread)
+    weights = np.ascontiguousarray(np.diff(below, axis=0).T, dtype=np.float32)
     weights /= weights.sum(axis=1, keepdims=True)
-    last = len(padded) - 1
-    light = np.zeros((len(places), padded.shape[1]), dtype=np.float32)
-    for k in range(2 * half + 1):
-        # Light comes from within the panel, so that the middle is hardly off it.
-        pixel = np.clip(middle + k + 1, 0, last)
-        light += weights[:, k, None] * padded[pixel]
-    return light
+    # Light comes from within the panel, so that the middle is hardly off it.
+    near = middle[:, None] + np.arange(1, 2 * half + 2, dtype=np.int32)
+    pixels = np.clip(near, 0, len(padded) - 1).ravel()
+    ends = np.arange(len(places) + 1, dtype=np.int32) * np.int32(2 * half + 1)
+    shape = len(places), len(padded)
+    return csr_array((weights.ravel(), pixels, ends), shape=shape) @ padded
