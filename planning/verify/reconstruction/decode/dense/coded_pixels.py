@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.arrays import lengths, rows_of
 from planning.verify.reconstruction.arrays import Array, Grey, Images, Indices, Mask
 from planning.verify.reconstruction.decode.code_map import CodeMap
 from planning.verify.reconstruction.decode.edges import MIN_CONTRAST, SATURATED
@@ -68,14 +69,14 @@ def read_codes(frames: Frames, pattern: DensePattern) -> CodedPixels:
     difference = white - black
     full = white >= SATURATED
     lit = np.flatnonzero((difference >= MIN_CONTRAST) & ~full)
-    pixels = stack.reshape(n_frames, -1)[:, lit]
+    pixels = stack.reshape(n_frames, -1).take(lit, axis=1)
     contrast = difference.ravel()[lit]
     noise = _grey_noise(pixels, pattern, contrast)
     half = noise.at(0.5 * (white + black).ravel()[lit])
     told = [_along(pixels, pattern, axis, contrast, half, noise) for axis in (0, 1)]
     one, other = told
     aside = places_lit(difference)
-    looks = np.linalg.norm(aside.reshape(-1, 2)[lit], axis=1)
+    looks = lengths(rows_of(aside.reshape(-1, 2), lit))
     fails = {
         "mixed": one.mixed | other.mixed,
         "modulation": one.faint | other.faint,
