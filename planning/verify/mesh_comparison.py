@@ -26,6 +26,9 @@ def compare_meshes(mesh: TriangleMesh, surface: TriangleMesh, seed: int) -> list
     differently repaired or triangulated. Both meshes decide where the points lie, so
     that no surface can be made to differ only beside them.
     """
+    same = np.array_equal(mesh.vertices, surface.vertices)
+    if same and np.array_equal(mesh.faces, surface.faces):
+        return []
     slack = 1e-4 * surface.radius
     if not np.allclose(mesh.bounds, surface.bounds, rtol=0.0, atol=slack):
         sizes = [np.round(_MM * np.ptp(m.bounds, axis=0), 2) for m in (mesh, surface)]
