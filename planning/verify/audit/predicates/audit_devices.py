@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from geometry.arrays import Array, Mask
+from geometry.arrays import Array, Mask, lengths
 from geometry.devices import ParallelModel, PinholeModel
 from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.light.dense_code import DenseCode
@@ -74,7 +74,7 @@ class DivergingRays:
     def emitted(self, frame: Array, spokes: Array) -> tuple[Array, Array]:
         """Return origins and unit directions of rays through spokes (n, 3), z = 0."""
         along = in_world(frame, spokes + [0.0, 0.0, 1.0])
-        along /= np.linalg.norm(along, axis=1)[:, None]
+        along /= lengths(along)[:, None]
         return np.tile(frame[:3, 3], (len(along), 1)), along
 
     def run(self, c: Array, z: Array) -> tuple[Array, Array]:
@@ -242,7 +242,7 @@ class AuditProjector:
     def ring_spacing(self, points: Array) -> Array:
         """Return the distance along m of the rings about each point, (n,) [m]."""
         gap = self.ring_gap(self.ring_coordinate(points))
-        return gap / np.linalg.norm(self.ring_gradient(points), axis=1)
+        return gap / lengths(self.ring_gradient(points))
 
     def in_beam(self, points: Array) -> Mask:
         """Return whether points lie in the beam and inside the last ring, (n,)."""

@@ -112,9 +112,10 @@ class PanelCanvas:
         whole = (self.drawn == 0.0) | (self.drawn == 1.0)
         whole &= (self.inner == 0.0) & (self.outer == 0.0)
         places = np.flatnonzero(~whole)
-        of = (self.annulus, self.inner, self.outer, self.drawn)
-        parts = (values.ravel()[places] for values in of)
-        return places, PanelCanvas(self.window, *parts, {})
+        shares = (self.inner, self.outer, self.drawn)
+        inner, outer, drawn = (share.ravel()[places] for share in shares)
+        annulus = self.annulus.ravel()[places]
+        return places, PanelCanvas(self.window, annulus, inner, outer, drawn, {})
 
 
 def frame_levels(

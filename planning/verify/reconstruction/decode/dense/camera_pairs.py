@@ -12,6 +12,7 @@ nothing.
 import numpy as np
 from scipy.spatial import KDTree
 
+from geometry.arrays import lengths
 from planning.verify.reconstruction.arrays import Array, Indices, Mask
 from planning.verify.reconstruction.calibration import CameraCalibration
 from planning.verify.reconstruction.cloud import Cloud
@@ -49,7 +50,7 @@ def between_cameras(
     points = camera.centre + t[:, None] * rays
     # Both cameras' codes are off; as pixels of the second camera, along its line.
     sigma_px, across_px = _along_line(by_code, np.sqrt(2.0) * spread, along, second)
-    reach = np.linalg.norm(points - second.centre, axis=1)
+    reach = lengths(points - second.centre)
     moved = np.linalg.norm(codes.moved.reshape(-1, 2)[places], axis=1)
     slope = np.sqrt(np.abs(np.linalg.det(by_code)))
     passes_px = gap / reach * second.focal_px
@@ -138,9 +139,9 @@ def _meet(
         s = cosine * t - beams @ baseline
         between = t[:, None] * rays - s[:, None] * beams - baseline
         along = rays - cosine[:, None] * beams
-        along /= np.linalg.norm(along, axis=1)[:, None]
+        along /= lengths(along)[:, None]
     behind = (t <= 0.0) | (s <= 0.0)
-    return np.where(behind, np.nan, t), np.linalg.norm(between, axis=1), along
+    return np.where(behind, np.nan, t), lengths(between), along
 
 
 def _along_line(
@@ -155,10 +156,10 @@ def _along_line(
         camera: That sees it.
     """
     line = along @ camera.world_from_device[:3, :2]
-    line /= np.maximum(np.linalg.norm(line, axis=1), 1e-12)[:, None]
+    line /= np.maximum(lengths(line), 1e-12)[:, None]
     across = line[:, ::-1] * np.array([-1.0, 1.0])
     sides = (
-        np.linalg.norm(np.einsum("ni,nij->nj", side, by_code) * spread, axis=1)
+        lengths(np.einsum("ni,nij->nj", side, by_code) * spread)
         for side in (line, across)
     )
     one, other = sides

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.arrays import lengths, rows_of
+from geometry.arrays import rows_of
 from planning.verify.reconstruction.arrays import Array, Grey, Images, Indices, Mask
 from planning.verify.reconstruction.decode.code_map import CodeMap
 from planning.verify.reconstruction.decode.edges import MIN_CONTRAST, SATURATED
@@ -76,7 +76,7 @@ def read_codes(frames: Frames, pattern: DensePattern) -> CodedPixels:
     told = [_along(pixels, pattern, axis, contrast, half, noise) for axis in (0, 1)]
     one, other = told
     aside = places_lit(difference)
-    looks = lengths(rows_of(aside.reshape(-1, 2), lit))
+    looks = np.linalg.norm(rows_of(aside.reshape(-1, 2), lit), axis=1)
     fails = {
         "mixed": one.mixed | other.mixed,
         "modulation": one.faint | other.faint,
