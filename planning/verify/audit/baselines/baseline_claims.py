@@ -2,7 +2,9 @@
 
 import numpy as np
 
-from geometry.rays.proximity import closest_points
+from geometry.arrays import Array, lengths
+from geometry.mesh.mesh import TriangleMesh
+from geometry.rays.proximity import triangle_distances
 from planning.model.document.device_records import BaselineRow
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
@@ -42,16 +44,23 @@ def audit_baselines(case: AuditCase, findings: AuditFindings) -> None:
         )
         sections.append((row, section_of(row, cameras)))
     mesh, largest = case.plan.surface.mesh, case.plan.requirements.camera.max_incidence
-    # All at once: a large mesh takes long to be made ready for it.
-    meeting = np.reshape([section.meeting for _, section in sections], (-1, 3))
-    apart = np.abs(closest_points(mesh, meeting).distances).tolist()
     reach = faces_reach(mesh)
-    for (row, section), apart_m in zip(sections, apart, strict=True):
+    for row, section in sections:
+        apart_m = _apart(section.meeting, mesh, reach)
         below = findings.at(f"baselines.{'-'.join(row.cameras)}")
         beside = are_normals(section.normals, section.meeting, mesh, reach)
         if _audit_seam(row, section, apart_m, below, beside=beside):
             _audit_row(row, section, largest, below)
             _audit_limit(row, section, largest, below)
+
+
+def _apart(point: Array, mesh: TriangleMesh, reach: Array) -> float:
+    """Return how far a point (3,) is from a mesh whose faces reach so far [m]."""
+    away = lengths(mesh.face_centroids - point)
+    # No tree: of most faces their middles tell that another one is nearer.
+    near = np.flatnonzero(away - reach <= away.min())
+    points = np.broadcast_to(point, (len(near), 3))
+    return float(triangle_distances(points, mesh.corners[near]).min())
 
 
 def _audit_seam(
