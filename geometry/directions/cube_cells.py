@@ -1,16 +1,18 @@
 """Which cells of a cube map segments pass through, and which of them hang together."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from geometry.arrays import Array, Ints, Mask
+from geometry.arrays import Array, Ints, Mask, Words
 from geometry.rays.rays import equal_parts
 
 from .cube_map import FACES, CubeMap, face_coordinates
+from .product_signs import WORD, unpacked
 
 # Gnomonic coordinates are exact to this; whatever comes as near as this is met.
 _MARGIN = 1e-7
@@ -137,6 +139,33 @@ def _spread(begin: Ints, counts: Ints, step: int = 1) -> tuple[Ints, Ints]:
     return which, begin.take(which) + np.arange(0, step * which.size, step)
 
 
+def _runs(marks: Mask, n: int) -> tuple[Ints, Ints]:
+    """Return the first and last cells of runs of marks in rows of n, among them all."""
+    words = _words(marks.ravel())
+    first, last = _ends_of_rows(marks.size, n)
+    before, after = words << 1, words >> 1
+    before[1:] |= words[:-1] >> (WORD - 1)
+    after[:-1] |= words[1:] << (WORD - 1)
+    begin, end = words & (~before | first), words & (~after | last)
+    bits = (unpacked(each, WORD) for each in (begin, end))
+    start, stop = (word * WORD + bit for bit, word in bits)
+    return start, stop
+
+
+@cache
+def _ends_of_rows(size: int, n: int) -> tuple[Words, Words]:
+    """Return the first and the last of each n cells, a bit each."""
+    place = np.arange(size) % n
+    return _words(place == 0), _words(place == n - 1)
+
+
+def _words(marks: Mask) -> Words:
+    """Return marks as bits, those that fill the last word up unset."""
+    words = np.zeros(-(-marks.size // WORD), dtype=np.uint64)
+    words.view(np.uint8)[: -(-marks.size // 8)] = np.packbits(marks, bitorder="little")
+    return words
+
+
 @dataclass(frozen=True, eq=False)
 class Pieces:
     """Cells in runs, and runs in pieces.
@@ -177,14 +206,7 @@ def pieces(marks: Mask, n: int) -> Pieces:
     joined with the runs of the next row that they touch: there are far fewer runs than
     cells.
     """
-    flat = np.ascontiguousarray(marks).ravel()
-    # All cells as one row first: rows are too short for numpy's loops.
-    begins, ends = np.empty_like(flat), np.empty_like(flat)
-    np.greater(flat[1:], flat[:-1], out=begins[1:])
-    np.greater(flat[:-1], flat[1:], out=ends[:-1])
-    begins[::n] = flat[::n]
-    ends[n - 1 :: n] = flat[n - 1 :: n]
-    start, stop = np.flatnonzero(begins), np.flatnonzero(ends)
+    start, stop = _runs(marks, n)
     # Runs of the next row whose last cell isn't before, and first cell isn't behind.
     low = np.searchsorted(stop, start + n)
     high = np.searchsorted(start, stop + n, side="right")

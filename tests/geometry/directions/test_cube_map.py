@@ -148,14 +148,18 @@ def test_widened_maps_never_miss_an_open_direction(n):
     which = rng.integers(samples, size=20_000)
     angles = rng.uniform(0.0, 1.2, which.size) ** 2
     asked = turned(targets[which], angles)
-    assert maps.open(asked, angles + 1e-9, which).all()
+
+    def found_open(angles):
+        return maps.open(asked, angles, which, maps.places(asked, angles))
+
+    assert found_open(angles + 1e-9).all()
     # Nor does it call everything open.
     far = angle_between(asked, targets[which]) > 0.5
-    closed = ~maps.open(asked, np.full(which.size, 0.01), which)
+    closed = ~found_open(np.full(which.size, 0.01))
     assert closed[far].mean() > (0.9 if n == 32 else 0.0)
     # Of next to no cone the cell that it lies in decides, but at borders of faces.
     own = is_open[which, cube.locate(asked)]
-    found = maps.open(asked, np.full(which.size, 1e-7), which)
+    found = found_open(np.full(which.size, 1e-7))
     assert np.all(found[own])
     assert np.mean(found != own) < 1e-3
-    assert maps.open(asked, np.full(which.size, 3.2), which).all()
+    assert found_open(np.full(which.size, 3.2)).all()
