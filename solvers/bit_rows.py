@@ -152,7 +152,7 @@ class BitSum:
             total = np.zeros(len(rows), dtype=np.int64)
             for value, mask in zip(self._values, self._masks, strict=True):
                 counts = np.bitwise_count(rows & mask)
-                total += value * counts.sum(axis=1, dtype=np.int64)
+                total += value * np.add.reduce(counts, axis=1, dtype=np.int64)
             return total
         total = np.empty(len(rows), dtype=np.int64)
         for part in parts(len(rows), _CHUNK):
@@ -185,5 +185,5 @@ class BitSums:
         for part in parts(len(rows), _LARGE // len(self._each) + 1):
             for value, masks in self._masks:
                 counts = np.bitwise_count(rows[part, None] & masks)
-                total[part] += value * counts.sum(axis=2, dtype=np.int64)
+                total[part] += value * np.add.reduce(counts, axis=2, dtype=np.int64)
         return total

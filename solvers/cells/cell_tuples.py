@@ -159,7 +159,7 @@ def _split(
         settled += _uses(nodes[~leaf], chosen[~leaf], halves[~leaf])
         final = (final | (nodes == chosen[:, None]))[leaf]
         nodes = nodes[leaf]
-    return np.concatenate(settled) if settled else nodes, None
+    return np.sort(np.concatenate(settled), axis=1) if settled else nodes, None
 
 
 def _uses(
@@ -173,8 +173,7 @@ def _uses(
         some = np.flatnonzero(uses == m)
         rows, places, two = (each.take(some, axis=0) for each in (nodes, at, halves))
         for second in range(m + 1):
-            parts_of = np.repeat(two, [m - second, second], axis=1)
             new = rows.copy()
-            new[places] = parts_of.ravel()
-            multisets.append(np.sort(new, axis=1))
+            new[places] = two.take([0] * (m - second) + [1] * second, axis=1).ravel()
+            multisets.append(new)
     return multisets
