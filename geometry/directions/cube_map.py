@@ -244,7 +244,8 @@ def widest(levels: Ints) -> Array:
     There lines cross at 60 degrees, and half the long diagonal is 0.816 of a step where
     it is 0.707 in the middle of a face.
     """
-    return circles(levels, np.zeros_like(levels))[1]
+    up_to = np.arange(levels.max(initial=0) + 1)
+    return circles(up_to, 0 * up_to)[1][levels]
 
 
 def _directions(level: Ints, cells: Ints, down: float, across: float) -> Array:

@@ -67,9 +67,11 @@ class WidenedMaps:
         never less.
         """
         answer = self._bits(places, samples) | (places < 0)
-        # What may yet be closed by a closer look.
+        # What may yet be closed by a closer look: where its own cell is.
         near = (places >= 0) & (places < self._first[1])
         small = np.flatnonzero(answer & near)
+        own = places[small] - self._first[0]
+        small = small[~self._bits(own, samples[small])]
         if small.size:
             four, do = cells_within(
                 by_column(directions, small), angles[small], int(self._cells[0])

@@ -27,7 +27,7 @@ from .lit_cells import LitCells
 from .shell_cells import Facing, Seen, ShellCells, seen_from
 
 # Pairs of cell and sample looked at together: they stay in the second-level cache.
-PAIRS = 1 << 13
+PAIRS = 1 << 14
 
 
 class PositionTree(GrownTree):
