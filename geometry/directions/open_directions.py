@@ -116,8 +116,8 @@ class OpenDirections:
         reached = np.cos(np.minimum(limit + cube.radii, np.pi))
         for part in equal_parts(len(normals), _at_once(cube)):
             cosine = normals[part] @ cube.centres.T
-            within[part] = cosine >= np.cos(limit)
-            near[part] = cosine >= reached
+            np.greater_equal(cosine, np.cos(limit), out=within[part])
+            np.greater_equal(cosine, reached, out=near[part])
         near = np.greater(near, within)
         row, cell = np.divmod(np.flatnonzero(near), cube.size)
         meets = _arcs_come_within(cube, normals[row], cell, np.cos(limit) - _ROUNDING)
@@ -189,8 +189,11 @@ def _arcs_come_within(cube: CubeMap, axes: Array, cells: Ints, cosine: float) ->
     """Return whether the border of each cell comes within an angle of its axis."""
     face, rest = np.divmod(cells, cube.n * cube.n)
     j, i = np.divmod(rest, cube.n)
+    across = cube.n + 1
+    first = (face * across + j) * across + i
     corners = [
-        cube.corners[face, j + b, i + a] for b, a in ((0, 0), (0, 1), (1, 1), (1, 0))
+        cube.corners.reshape(-1, 3).take(first + step, axis=0)
+        for step in (0, 1, across + 1, across)
     ]
     near = np.zeros(cells.size, dtype=bool)
     for start, end in zip(corners, corners[1:] + corners[:1], strict=True):
