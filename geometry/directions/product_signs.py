@@ -54,7 +54,7 @@ class ProductSigns:
             np.abs(products, out=products)
             unsure[part] = packed(products <= np.float32(doubt)) != 0
         rows = np.flatnonzero(unsure)
-        return words, rows, self._rows[rows] @ columns.T
+        return words, rows, self._rows.take(rows, axis=0) @ columns.T
 
 
 def packed(bits: Mask) -> Words:

@@ -57,10 +57,12 @@ class Silhouettes:
 
     def __init__(self, mesh: TriangleMesh) -> None:
         edges = mesh.edges
-        self._pairs, shared = _pairs_and_borders(edges)
+        pairs, shared = _pairs_and_borders(edges)
+        # Column by column: rows of two are too short for numpy's loops.
+        self._pairs = np.asfortranarray(pairs)
         single = edges.n_faces[shared] != 2
         self._always = np.where(single, ~_NONE, _NONE)
-        self._ends = edges.ends[shared]
+        self._ends = np.asfortranarray(edges.ends[shared])
         self._middle = mesh.bounds.mean(axis=0)
         self._vertices = mesh.vertices - self._middle
         self._columns = np.ascontiguousarray(self._vertices.T)
@@ -104,13 +106,10 @@ class Silhouettes:
         unsure[rows] = over[rows] ^ packed(heights > -self._unsure)
         beside[rows] = packed(np.abs(heights) <= close)
         f, g = self._pairs.T
-        return Sides(
-            local,
-            normals,
-            beside,
-            (over[f] ^ over[g] ^ self._turned) | unsure[f] | unsure[g] | self._always,
-            above[self._ends[:, 0]] | above[self._ends[:, 1]],
-        )
+        changes = over.take(f) ^ over.take(g) ^ self._turned
+        changes |= unsure.take(f) | unsure.take(g) | self._always
+        begin, end = (above.take(ends) for ends in self._ends.T)
+        return Sides(local, normals, beside, changes, begin | end)
 
     def faces_within(self, sides: Sides, reach: float) -> Words:
         """Return for each face the points to which it comes within reach [m], as bits.
@@ -146,8 +145,8 @@ class Silhouettes:
         """
         words = sides.changes
         if among is not None:
-            f, g = self._pairs.T
-            words = (words & among[f] & among[g]) | (among[f] ^ among[g])
+            f, g = (among.take(faces) for faces in self._pairs.T)
+            words = (words & f & g) | (f ^ g)
         owners, edges = unpacked(words & sides.above, len(sides.local))
         # Column by column: rows of three are too short for numpy's loops.
         points, axes = (
