@@ -143,9 +143,10 @@ def _runs(marks: Mask, n: int) -> tuple[Ints, Ints]:
     """Return the first and last cells of runs of marks in rows of n, among them all."""
     words = _words(marks.ravel())
     first, last = _ends_of_rows(marks.size, n)
-    before, after = words << 1, words >> 1
-    before[1:] |= words[:-1] >> (WORD - 1)
-    after[:-1] |= words[1:] << (WORD - 1)
+    one, across = np.uint64(1), np.uint64(WORD - 1)
+    before, after = words << one, words >> one
+    before[1:] |= words[:-1] >> across
+    after[:-1] |= words[1:] << across
     begin, end = words & (~before | first), words & (~after | last)
     bits = (unpacked(each, WORD) for each in (begin, end))
     start, stop = (word * WORD + bit for bit, word in bits)

@@ -133,6 +133,15 @@ def test_segments_along_the_lines_between_cells_mark_both_sides():
         assert marks[0, cube.locate(line)].all()
 
 
+@pytest.mark.parametrize("n", [1, 2, 3, 16, 64, 200])
+def test_rows_and_columns_are_those_between_the_lines(n):
+    cube = CubeMap(n)
+    beside = cube.lines[:, None] + np.array([-1e-7, -1e-15, 0.0, 1e-15, 1e-7])
+    asked = np.concatenate([beside.ravel(), np.linspace(-1.0, 1.0, 5000)])
+    found = np.searchsorted(cube.lines, asked, side="right") - 1
+    np.testing.assert_array_equal(cube.cells_at(asked), np.clip(found, 0, n - 1))
+
+
 @pytest.mark.parametrize("n", [4, 32])
 def test_widened_maps_never_miss_an_open_direction(n):
     """Open cells are few; whoever is within the angle of one must be told."""

@@ -11,7 +11,7 @@ from support.array_trees import ArrayTree
 from support.leaf_trees import leaves_of, tree_of_leaves
 
 from solvers import bit_rows
-from solvers.bit_rows import BitSum, pack_rows, unpack_rows
+from solvers.bit_rows import BitSum, BitSums, pack_rows, unpack_rows
 from solvers.cells import cell_store
 from solvers.cells import cell_tree as cells
 from solvers.cells.cell_bound import CellStatus, bound_count
@@ -46,6 +46,12 @@ def test_bits_weigh_exactly_what_their_rows_weigh(n_values):
     values = rng.integers(0, 2**41, n_values)[rng.integers(0, n_values, 777)]
     exact = [sum(int(v) for v in values[row]) for row in serves]
     assert BitSum(values)(pack_rows(serves)).tolist() == exact
+    # Several sums at once are what each is alone.
+    several = np.stack([values, np.where(np.arange(777) % 2, values, 0)])
+    alone = [BitSum(each)(pack_rows(serves)) for each in several]
+    sums = BitSums(several)
+    np.testing.assert_array_equal(sums(pack_rows(serves)), np.stack(alone, axis=1))
+    assert sums.units == sum(BitSum(each).units for each in several)
 
 
 def test_parents_of_leaves_hold_exactly_the_union():
