@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from solvers.bit_rows import transposed
 from solvers.covers.cover_problem import CoverProblem
 
 
@@ -57,6 +58,10 @@ class ReducedCover:
     def by_row(self) -> sparse.csr_array:
         """Ones where row e is served by set s, shape (n_e, n_s), CSR."""
         return sparse.csr_array(self.by_set.T)
+
+    def dense_rows(self) -> NDArray[np.bool_]:
+        """Return whether row e is served by set s, shape (n_e, n_s)."""
+        return transposed(self.by_set.astype(bool).toarray())
 
     @cached_property
     def simple(self) -> bool:

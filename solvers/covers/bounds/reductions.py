@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from solvers.bit_rows import pack_shuffled, sparse_rows
+from solvers.bit_rows import pack_shuffled, sparse_rows, transposed
 from solvers.checked_numbers import WEIGHT_SLACK, whole_weights
 from solvers.covers.cover_problem import CoverProblem
 
@@ -59,7 +59,7 @@ def reduce_problem(
     labels = np.stack([needs[live], row_sets[live]], axis=1)
     bits, first, inverse = _merge_rows(problem, live, labels)
     rows = np.unpackbits(bits, axis=1, count=costs.size).view(bool)
-    sets = np.ascontiguousarray(rows.T)
+    sets = transposed(rows)
     merged = np.bincount(inverse, weights=whole[live], minlength=first.size)
     merged, needs = merged.astype(np.float64), needs[live][first]
     stock = problem.stock - np.bincount(

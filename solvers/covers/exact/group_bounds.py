@@ -85,7 +85,6 @@ class PartBounds:
         self._target, self._budget = target, budget
         self._leaves_out = leaves_out
         self._grid = 2.0 ** max(0.0, np.ceil(np.log2(self._total / _EXACT)))
-        self._most_steps = self._weights / self._grid
 
     def whole(self, shares: NDArray[np.float64]) -> GroupPart:
         """Return the part of all selections, not bounded yet."""
@@ -165,7 +164,7 @@ class PartBounds:
         The latter two have shape (p, n_s): selections with a set beside the groups
         cover so much less than the bound at most.
         """
-        steps = np.floor(shares * self._most_steps)
+        steps = np.floor(shares * (self._weights / self._grid))
         payments = self._payments(steps.astype(np.float32))
         self._budget.spend(
             2.0 * len(shares) * self.covers.size * _DENSE_UNIT

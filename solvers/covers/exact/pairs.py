@@ -71,7 +71,8 @@ class _Pairs:
     ) -> None:
         self.cover, self.best, self.budget = cover, best, budget
         # Rows that few sets cover refute most.
-        order = np.argsort(np.diff(cover.by_row.indptr), kind="stable")
+        servers = np.bincount(cover.by_set.indices, minlength=cover.weights.size)
+        order = np.argsort(servers, kind="stable")
         self._weights = cover.weights[order]
         self._missed = ~cover.by_set.astype(bool).toarray()[:, order]
 

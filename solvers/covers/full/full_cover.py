@@ -66,7 +66,7 @@ def fewest_full(
     Raises:
         ValueError: If the start leaves a row open.
     """
-    served = cover.by_row.astype(bool).toarray()
+    served = cover.dense_rows()
     start = np.unique(np.asarray(start, dtype=np.int64))
     if not served[:, start].any(axis=1).all():
         raise ValueError(f"start of {start.size} sets must cover every row")

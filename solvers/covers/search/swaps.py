@@ -52,7 +52,7 @@ class Swaps:
         self._unit = _exact_unit(cover.weights)
         exact = np.float64 if self._unit is None else np.float32
         self._weights = (cover.weights / (self._unit or 1.0)).astype(exact)
-        self._serves = cover.by_set.astype(bool).toarray().T.copy()
+        self._serves = cover.dense_rows()
         self._counts = np.zeros(cover.weights.size, dtype=np.int64)
         # Sum of 1 + s over the sets that cover a row: its owner, where there's but one.
         self._owners = np.zeros(cover.weights.size, dtype=np.int64)
@@ -110,7 +110,7 @@ class Swaps:
             change[tabu & (change <= beyond)] = -np.inf
         if sold_out is not None:
             change[sold_out] = -np.inf
-        out, into = divmod(int(np.argmax(change)), change.shape[1])
+        out, into = divmod(int(change.argmax()), change.shape[1])
         return float(change[out, into]), out, into
 
     def _members(self, s: int) -> NDArray[np.signedinteger]:
@@ -125,7 +125,7 @@ class Swaps:
         self._places[[s + 1 for s in owners]] = np.arange(len(owners))
         owner = self._places[self._owners[rows]]
         # Sorted by owner, so that a block of rows has few of them.
-        order = np.argsort(owner, kind="stable")
+        order = owner.argsort(kind="stable")
         rows, owner = rows[order], owner[order]
         total = np.zeros((len(owners), n_sets))
         step = max(1, _BLOCK // max(1, n_sets))
@@ -133,12 +133,13 @@ class Swaps:
             part = slice(start, start + step)
             weights = self._weights[rows[part]]
             serves = self._serves.take(rows[part], axis=0).astype(weights.dtype)
-            few = range(int(owner[part][0]), int(owner[part][-1]) + 1)
-            ends = [0, *np.searchsorted(owner[part], few, side="right").tolist()]
+            few = np.arange(owner[part][0], owner[part][-1] + 1)
+            ends, begin = owner[part].searchsorted(few, side="right"), 0
             # One by one, since BLAS copies the rows for several before it multiplies.
-            for o, own in zip(few, map(slice, ends, ends[1:]), strict=True):
-                total[o] += weights[own] @ serves[own]
-            self._budget.spend(serves.size * (1.0 + _PRODUCT_UNIT * len(few)))
+            for o, end in zip(few.tolist(), ends.tolist(), strict=True):
+                total[o] += weights[begin:end] @ serves[begin:end]
+                begin = end
+            self._budget.spend(serves.size * (1.0 + _PRODUCT_UNIT * few.size))
         self._budget.spend(total.size + _CALL_UNITS)
         return total if self._unit is None else total * self._unit
 
