@@ -1,7 +1,7 @@
 """Quantities as a person reads them."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 # Areas below this are told in mm² [m²].
 _SMALL_M2 = 1e-4
@@ -17,6 +17,11 @@ def area_words(area_m2: float) -> str:
 def count_words(count: int, noun: str) -> str:
     """Return a count with its noun, in the plural unless it is 1."""
     return f"{count} {noun}{'s' * (count != 1)}"
+
+
+def tenths(numbers: Iterable[float]) -> list[float]:
+    """Return numbers as one decimal shows them, halves as a format rounds, no -0.0."""
+    return [round(float(number), 1) + 0.0 for number in numbers]
 
 
 def percent(

@@ -1,6 +1,7 @@
 """What one mounts by: the housing's angles, and places in the axes of the mesh."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,8 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import box
 from planning.cli.main import commands
 from planning.model.devices.bodies import Obstacle
+from planning.report.page.device_tables import device_tables
+from planning.report.summary.brief import brief
 from planning.report.summary.devices.device_lines import device_lines
 from planning.report.summary.devices.zone_lines import zone_lines
 from planning.verify.audit.devices.camera_figures import camera_figures
@@ -54,6 +57,22 @@ def test_the_housing_is_turned_otherwise_than_the_image_where_the_lens_is_shifte
     shifted = np.degrees(np.arctan((980 - 383.5) / 1500))
     assert elevation == pytest.approx(shifted, abs=0.05)
     assert standoff == pytest.approx(1000.0)
+
+
+def test_places_have_the_same_digits_wherever_they_are_printed(plan, handmade):
+    """Halves of a tenth too, and nothing is at -0.0."""
+
+    def stand(document):
+        pose = document["projectors"][0]["world_from_device"]
+        for row, at in zip(pose, (0.80135, -0.00001, -0.80145), strict=False):
+            row[3] = at
+
+    stood = handmade.tampered(plan, stand)
+    rows = [*device_lines(stood), *brief(stood, [], []).splitlines()]
+    places = [row.split()[1:4] for row in rows if row.startswith("P1")]
+    (row,) = re.findall("P1</th>(.*?)</tr>", next(iter(device_tables(stood))))
+    places.append(re.findall(">([^<>]+)</td>", row)[:3])
+    assert places == [["801.4", "0.0", "-801.5"]] * 3
 
 
 def test_the_table_says_where_the_centre_of_the_object_is(plan, handmade):

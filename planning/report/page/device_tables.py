@@ -6,7 +6,7 @@ import numpy as np
 
 from planning.model.document.device_records import ProjectorRecord
 from planning.model.plan import RigPlan
-from planning.model.words import area_words, percent
+from planning.model.words import area_words, percent, tenths
 from planning.report.summary.coverage_lines import schedule_lines
 from planning.report.summary.devices.device_lines import axis_name, gap_lines, standing
 from planning.rings.acquisition import n_frames
@@ -37,8 +37,7 @@ def _poses(plan: RigPlan) -> str:
             [
                 device.id + (f" ({device.existing})" if device.existing else ""),
                 *([device.model] if several else []),
-                # Adding 0.0 leaves no -0.0.
-                *(f"{number:.1f}" for number in np.round(numbers, 1) + 0.0),
+                *(f"{number:.1f}" for number in tenths(numbers)),
                 f"{distance:.1f}",
                 f"{1e3 * near:.0f} to {1e3 * far:.0f}",
                 " x ".join(map(str, device.device.resolution)),
@@ -67,7 +66,7 @@ def _mounts(plan: RigPlan) -> str:
         if record.world_from_mount is None:
             continue
         pose = np.array(record.world_from_mount)
-        place = [f"{x:.1f}" for x in np.round(1e3 * pose[:3, 3], 1) + 0.0]
+        place = [f"{x:.1f}" for x in tenths(1e3 * pose[:3, 3])]
         ways = [
             ", ".join(f"{x:.4f}" for x in np.round(pose[:3, axis], 4) + 0.0)
             for axis in (2, 0)

@@ -11,7 +11,7 @@ import numpy as np
 
 from geometry.poses import horizontal_axes
 from planning.model.plan import RigPlan
-from planning.model.words import count_words, share_words
+from planning.model.words import count_words, share_words, tenths
 from planning.report.tolerance.joint_lines import joint_words
 from planning.report.tolerance.robust_lines import robust_cost
 from planning.report.tolerance.survival_lines import by_several_pairs, losses_words
@@ -121,8 +121,8 @@ def _devices(plan: RigPlan, room: int) -> list[str]:
         "         position x, y, z [mm]             pan    tilt    roll   aim azimuth, "
         "elevation   standoff"
     ]
-    for device, (x, y, z, *housing, azimuth, elevation, distance) in told:
-        pan, tilt, roll = np.round(housing, 1) + 0.0
+    for device, numbers in told:
+        x, y, z, pan, tilt, roll, azimuth, elevation, distance = tenths(numbers)
         kept = (
             f"  existing: {device.existing}"
             if device.existing not in ("", device.id)

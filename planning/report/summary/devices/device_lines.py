@@ -13,7 +13,7 @@ from geometry.shapes.boxes import box_gap
 from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
-from planning.model.words import count_words
+from planning.model.words import count_words, tenths
 from planning.scene.placed_bodies import bodies_of
 
 from .station_lines import device_counts
@@ -45,9 +45,8 @@ def device_lines(plan: RigPlan) -> list[str]:
     ]
     workspace = plan.requirements.workspace
     centre, up = np.array(workspace.centre), np.array(workspace.up)
-    for device, (x, y, z, *housing, azimuth, elevation, distance) in standing(plan):
-        # A roll of -0.0 is none.
-        pan, tilt, roll = np.round(housing, 1) + 0.0
+    for device, numbers in standing(plan):
+        x, y, z, pan, tilt, roll, azimuth, elevation, distance = tenths(numbers)
         lines.append(
             f"{device.id:<4} {x:9.1f} {y:9.1f} {z:9.1f}    {pan:15.1f} {tilt:7.1f} "
             f"{roll:7.1f}   {azimuth:8.1f} {elevation:10.1f}   {distance:18.1f}"
@@ -55,7 +54,7 @@ def device_lines(plan: RigPlan) -> list[str]:
             + (f"   {device.model}" if device.model else "")
             + (f"   existing: {device.existing}" if device.existing else "")
         )
-    x, y, z = np.round(1e3 * centre, 1) + 0.0
+    x, y, z = tenths(1e3 * centre)
     first = axis_name(horizontal_axes(up)[0])
     return [
         *lines,
@@ -96,7 +95,7 @@ def mount_lines(plan: RigPlan) -> list[str]:
     for record in (*plan.document.projectors, *plan.document.cameras):
         if record.world_from_mount is not None:
             pose = np.array(record.world_from_mount)
-            x, y, z = 1e3 * pose[:3, 3] + 0.0
+            x, y, z = tenths(1e3 * pose[:3, 3])
             ways = "   ".join(_direction(pose[:3, axis]) for axis in (2, 0))
             lines.append(f"{record.id:<4} {x:9.1f} {y:9.1f} {z:9.1f}   {ways}")
     if not lines:

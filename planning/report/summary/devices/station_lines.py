@@ -13,7 +13,7 @@ from planning.model.document.station_records import (
     TradeRow,
 )
 from planning.model.plan import RigPlan
-from planning.model.words import count_words, labelled
+from planning.model.words import count_words, labelled, tenths
 
 # What a station is called, by kind.
 STATIONS = {"heads": "head", "stations": "station", "turntable": "step"}
@@ -79,8 +79,8 @@ def _row(one: StationRecord, up: Array) -> str:
     if one.angle is not None:
         return f"{one.id:<4} {np.degrees(one.angle):9.4g} degrees   {devices}"
     pose = np.array(one.world_from_station)
-    x, y, z = 1e3 * pose[:3, 3]
-    pan, tilt, roll = np.round(np.degrees(pan_tilt_roll(pose[:3, :3], up)), 1) + 0.0
+    x, y, z = tenths(1e3 * pose[:3, 3])
+    pan, tilt, roll = tenths(np.degrees(pan_tilt_roll(pose[:3, :3], up)))
     place = f"{one.id:<4} {x:9.1f} {y:9.1f} {z:9.1f}"
     return f"{place}  {pan:9.1f} {tilt:7.1f} {roll:7.1f}   {devices}"
 

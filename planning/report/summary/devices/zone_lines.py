@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from planning.model.devices.bodies import Box
 from planning.model.plan import RigPlan
 from planning.model.requirements import Workspace
-from planning.model.words import labelled
+from planning.model.words import labelled, tenths
 
 from .device_lines import axis_name
 
@@ -102,7 +102,7 @@ def _box(box: Box, centre: NDArray[np.float64]) -> str:
 
 
 def _extent(low: NDArray[np.float64], high: NDArray[np.float64]) -> str:
-    ends = zip("xyz", 1e3 * low + 0.0, 1e3 * high + 0.0, strict=True)
+    ends = zip("xyz", tenths(1e3 * low), tenths(1e3 * high), strict=True)
     return ", ".join(f"{name} {a:.1f} to {b:.1f}" for name, a, b in ends)
 
 
@@ -111,4 +111,4 @@ def _direction(vector: Sequence[float]) -> str:
 
 
 def _mm(point: NDArray[np.float64]) -> str:
-    return ", ".join(f"{part:.1f}" for part in np.round(1e3 * point, 1) + 0.0)
+    return ", ".join(f"{part:.1f}" for part in tenths(1e3 * point))
