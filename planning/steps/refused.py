@@ -36,6 +36,8 @@ _LEAST = {
     **{"seed": 0, "survive": 0, "max_projectors": 0, "max_cameras": 0},
     **{"threads": 1, "views": 1, "max_heads": 1},
 }
+# No rig has more devices, and readers of plans refuse whole numbers beyond 2^53.
+_MOST_DEVICES = 1_000_000
 _NUMBERS = (
     *("coverage", "dominant_coverage", "min_reachable", "region_coverage"),
     *("accuracy_mm", "family_quantile", "robust", "time_limit"),
@@ -81,6 +83,8 @@ def _must_be(name: str, value: object) -> str:
         return _TYPES[name][1]
     if name in _LEAST and not (_whole(value) and value >= _LEAST[name]):
         return f"a whole number, {_LEAST[name]} or more"
+    if name.startswith("max_") and _whole(value) and value > _MOST_DEVICES:
+        return f"{_MOST_DEVICES} at most"
     real = isinstance(value, float | np.floating) and not np.isnan(value)
     if name in _NUMBERS and not (real or _whole(value)):
         return "a number"

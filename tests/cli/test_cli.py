@@ -233,6 +233,12 @@ def test_a_signal_while_a_plan_is_saved_costs_no_second_saving(
         (["--mesh", "no.obj", "--max-projectors", 3], 3, "no such file"),
         (["--mesh", "FACE", "--unit", "m", "--max-projectors", 3], 3, "--unit mm"),
         (["--mesh", "FACE", "--max-projectors", 0], 2, "not in the range"),
+        (["--mesh", "FACE", "--max-projectors", 10**23], 2, "not in the range"),
+        (
+            ["--mesh", "FACE", "--max-projectors", 3, "--max-cameras", 2**54],
+            2,
+            "1<=x<=1000000",
+        ),
         (["--mesh", "FACE"], 2, "--max-projectors"),
         (["--mesh", "FACE", "--max-projectors", 3, "--nope"], 2, "--nope"),
         (

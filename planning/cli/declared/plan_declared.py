@@ -42,6 +42,8 @@ _GROUPS = {
         *("verbose", "as_json", "quiet", "debug"),
     ),
 }
+# As `planning.steps.refused` has it, which is heavy to import.
+_MOST = 1_000_000
 _EXAMPLES = (
     "plan --mesh part.stl --max-projectors 4 --target surface --coverage 98%",
     "plan --mesh part.stl --max-projectors 4 --rig bench.toml --accuracy 0.1 -o out",
@@ -107,20 +109,20 @@ class GroupedCommand(click.Command):
 )
 @click.option(
     "--max-projectors",
-    type=click.IntRange(0),
+    type=click.IntRange(0, _MOST),
     metavar="N",
     help="Projectors at most; needed unless --max-heads, --pareto or --pattern none is "
     "given.",
 )
 @click.option(
     "--max-cameras",
-    type=click.IntRange(1),
+    type=click.IntRange(1, _MOST),
     metavar="N",
     help="Cameras at most [default: as many as needed].",
 )
 @click.option(
     "--max-heads",
-    type=click.IntRange(1),
+    type=click.IntRange(1, _MOST),
     metavar="N",
     help="Of a rig with a [head]: heads at most, or its [stations].",
 )
