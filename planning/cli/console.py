@@ -201,8 +201,8 @@ def writable(folder: Path) -> Generator[None]:
     Raises:
         click.UsageError: If nothing can be written into the folder.
     """
-    missing = [f for f in (folder, *folder.parents) if not f.exists()]
     try:
+        missing = [f for f in (folder, *folder.parents) if not f.exists()]
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass

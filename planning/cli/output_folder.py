@@ -11,6 +11,8 @@ import sys
 import time
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
+from glob import escape
+from hashlib import sha256
 from pathlib import Path
 from uuid import uuid4
 
@@ -28,6 +30,8 @@ OWNED = (*_DATA, "members", "rig.png", PAGE, "patterns", *_CLOUDS)
 _EXCHANGE, _SWAP, _HERE = 2, 2, -100
 # What is younger may be what another run is writing just now [s].
 _BUSY_S = 600.0
+# Of the name of a folder that stands in that of the one written beside it [bytes].
+_LONGEST = 200
 
 
 @contextmanager
@@ -88,7 +92,11 @@ def uninterrupted() -> Generator[None]:
 
 
 def _prefix(folder: Path) -> str:
-    return f".{folder.name}.ringrig-"
+    """Return how the names begin under which a folder is written beside itself."""
+    name = os.fsencode(folder.name)
+    # File systems take 255 bytes, of which what stands behind takes 46.
+    short = folder.name if len(name) <= _LONGEST else sha256(name).hexdigest()
+    return f".{short}.ringrig-"
 
 
 def _swap(fresh: Path, folder: Path) -> None:
@@ -151,7 +159,7 @@ def _move_entries(fresh: Path, folder: Path) -> None:
 
 def _recover(folder: Path) -> None:
     """Clean up behind a run that was killed while folders changed places."""
-    for remnant in folder.parent.glob(f"{_prefix(folder)}*"):
+    for remnant in folder.parent.glob(f"{escape(_prefix(folder))}*"):
         if time.time() - remnant.stat().st_mtime < _BUSY_S and folder.exists():
             continue
         if folder.exists():

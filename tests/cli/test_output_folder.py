@@ -6,9 +6,11 @@ import signal
 import sys
 
 import pytest
+from click import UsageError
 from PIL import Image
 
 from planning.cli import output_folder
+from planning.cli.console import writable
 from planning.cli.output_folder import exchanged, uninterrupted
 from planning.cli.plans.saved_plans import SavedPlans
 from planning.model.plan import RigPlan
@@ -112,6 +114,25 @@ def test_what_a_killed_run_left_is_cleaned_up(folder):
         fill(fresh, "new")
     assert contents(folder) == NEW
     assert [p.name for p in folder.parent.iterdir()] == ["out"]
+
+
+@pytest.mark.parametrize("name", ["part [1]", 250 * "n", 125 * "ü"])
+def test_a_folder_of_any_name_is_written_and_found_again(tmp_path, name):
+    folder = tmp_path / name
+    with exchanged(folder) as fresh:
+        fill(fresh, "old")
+    # As a kill between two moves leaves it.
+    folder.rename(f"{fresh}-old")
+    with exchanged(folder) as fresh:
+        assert (folder / "plan.json").read_text() == "old"
+        fill(fresh, "new")
+    assert [p.name for p in tmp_path.iterdir()] == [name]
+
+
+def test_a_name_that_no_system_takes_is_refused_before_the_work(tmp_path):
+    refused = pytest.raises(UsageError, match="choose another folder")
+    with refused, writable(tmp_path / (300 * "n")):
+        raise AssertionError("the work began")
 
 
 def test_a_signal_waits_until_all_is_written():
