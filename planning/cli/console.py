@@ -220,6 +220,19 @@ def writable(folder: Path) -> Generator[None]:
 
 
 @contextmanager
+def writable_file(path: Path) -> Generator[None]:
+    """Fail before the work where `-o` names no file that can be written.
+
+    Raises:
+        click.UsageError: If it is a folder, or nothing can be written into its own.
+    """
+    if os.path.isdir(path):
+        raise click.UsageError(f"{path} is a folder; give a file's name with -o")
+    with writable(path.parent):
+        yield
+
+
+@contextmanager
 def stop_signals(handler: Callable[[int, Any], Any]) -> Generator[None]:
     """Handle Ctrl-C and SIGTERM in another way meanwhile."""
     before = [signal.signal(number, handler) for number in _STOPS]

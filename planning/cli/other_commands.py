@@ -30,7 +30,7 @@ from planning.verify.board_images.board_lines import (
 )
 from planning.verify.board_images.chosen_images import plan_images
 
-from .console import print_json, reporter, writable
+from .console import print_json, reporter, writable_file
 
 
 def calibrate_command(options: Mapping[str, Any]) -> int:
@@ -51,7 +51,7 @@ def calibrate_command(options: Mapping[str, Any]) -> int:
     if limit_m is None:
         raise click.UsageError("the plan has no largest sigma; give --accuracy MM")
     path = options["output"] or options["plan_file"].parent / "calibration-images.json"
-    with writable(path.parent):
+    with writable_file(path):
         found = plan_images(
             plan,
             board,
@@ -86,7 +86,8 @@ def _pair(
 def sample_command(output: Path, faces: int, variant: int | None) -> int:
     """Write the sample head."""
     shape = HeadShape() if variant is None else HeadShape.random(variant)
-    write_sample(output, shape=shape, n_faces=faces)
+    with writable_file(output):
+        write_sample(output, shape=shape, n_faces=faces)
     click.echo(f"wrote {output}: a head in millimetres, face along -y, up z")
     return 0
 

@@ -18,7 +18,7 @@ from planning.verify.audit.devices.camera_figures import (
     camera_figures,
 )
 
-from .console import print_json
+from .console import print_json, writable_file
 from .lines.comparison import compared, comparison_lines
 
 # Beside what the plan says: recomputed from its poses.
@@ -103,7 +103,8 @@ def report_command(options: Mapping[str, Any]) -> int:
             raise FileNotFoundError(f"{path.parent} is no folder; make it first")
     for path, shown in pages.items():
         threads = options["threads"] or n_threads()
-        write_page(shown, path, threads=threads, linked=alone is None)
+        with writable_file(path):
+            write_page(shown, path, threads=threads, linked=alone is None)
     if options["as_json"]:
         print_json({"files": [str(path) for path in pages]})
     else:

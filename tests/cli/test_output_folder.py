@@ -7,10 +7,13 @@ import sys
 
 import pytest
 from click import UsageError
+from click.testing import CliRunner
 from PIL import Image
+from support.exported_plans import exported_plan
 
 from planning.cli import output_folder
 from planning.cli.console import writable
+from planning.cli.main import commands
 from planning.cli.output_folder import exchanged, uninterrupted
 from planning.cli.plans.saved_plans import SavedPlans
 from planning.model.plan import RigPlan
@@ -133,6 +136,30 @@ def test_a_name_that_no_system_takes_is_refused_before_the_work(tmp_path):
     refused = pytest.raises(UsageError, match="choose another folder")
     with refused, writable(tmp_path / (300 * "n")):
         raise AssertionError("the work began")
+
+
+@pytest.mark.parametrize(
+    ("output", "rule"), [("", "give a file's name"), ("plan.json/x", "folder")]
+)
+@pytest.mark.parametrize(
+    "command", ["report PLAN", "calibrate --accuracy 1 PLAN", "sample"]
+)
+def test_a_file_that_cant_be_written_is_refused_before_the_work(
+    tmp_path, monkeypatch, command, output, rule
+):
+    def work(*_, **__):
+        raise AssertionError("the work began")
+
+    exported_plan().save(tmp_path / "plan.json")
+    monkeypatch.setattr("planning.cli.other_commands.plan_images", work)
+    monkeypatch.setattr("planning.cli.other_commands.write_sample", work)
+    monkeypatch.setattr("planning.cli.show_command.write_page", work)
+    words = command.replace("PLAN", str(tmp_path)).split()
+    done = CliRunner().invoke(commands, [*words, "-o", str(tmp_path / output)])
+    assert done.exit_code == 2
+    assert rule in done.output
+    assert str(tmp_path) in done.output
+    assert "Errno" not in done.output
 
 
 def test_a_signal_waits_until_all_is_written():
