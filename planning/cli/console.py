@@ -256,8 +256,9 @@ def run(command: Callable[[], int], *, debug: bool) -> None:
         if code == _INTERRUPTED or abandoned():
             leave(code)
         sys.exit(code)
-    except KeyboardInterrupt:
-        tell("interrupted before there was anything to keep; nothing was written")
+    except KeyboardInterrupt as interrupt:
+        nothing = "interrupted before there was anything to keep; nothing was written"
+        tell(str(interrupt) or nothing)
         leave(_INTERRUPTED)
     except BrokenPipeError:
         # Whoever reads stdout has had enough; Python must not complain at exit.

@@ -30,7 +30,7 @@ from planning.verify.board_images.board_lines import (
 )
 from planning.verify.board_images.chosen_images import plan_images
 
-from .console import print_json, reporter, writable_file
+from .console import print_json, reporter, writable, writable_file
 
 
 def calibrate_command(options: Mapping[str, Any]) -> int:
@@ -94,11 +94,18 @@ def sample_command(output: Path, faces: int, variant: int | None) -> int:
 
 def sample_family_command(folder: Path, faces: int, count: int, seed: int) -> int:
     """Write a family of heads, from child to adult."""
-    folder.mkdir(parents=True, exist_ok=True)
     digits = max(2, len(str(count)))
-    for member in range(count):
-        path = folder / f"head-{member + 1:0{digits}}.obj"
-        write_sample(path, shape=HeadShape.of_family(seed, member), n_faces=faces)
+    done = 0
+    try:
+        with writable(folder):
+            for done in range(count):
+                path = folder / f"head-{done + 1:0{digits}}.obj"
+                write_sample(path, shape=HeadShape.of_family(seed, done), n_faces=faces)
+    except KeyboardInterrupt:
+        if not done:
+            raise
+        told = f"interrupted; {folder} has {done} of {count_words(count, 'head')}"
+        raise KeyboardInterrupt(told) from None
     click.echo(
         f"wrote {folder}: {count_words(count, 'head')} in millimetres, from child to "
         f"adult; `plan --mesh {folder} --max-projectors 5` plans one rig for all"

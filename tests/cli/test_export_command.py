@@ -1,11 +1,13 @@
 """`plan export`: several formats at once, what it prints, and how it ends."""
 
 import json
+import sys
 
 import pytest
 from click.testing import CliRunner
 from support.exported_plans import exported_plan
 
+from planning.cli import console
 from planning.cli.declared.export_declared import FORMATS, MITSUBA
 from planning.cli.main import commands
 from planning.handover.export import export_formats
@@ -60,6 +62,41 @@ def test_what_a_format_lacks_ends_with_1_and_costs_no_other(folder, tmp_path):
     assert "P2: left out, COLMAP has no parallel light" in readme
     lines = export(folder, "--to", "step,colmap", "-o", tmp_path).output
     assert "  P2: left out, COLMAP has no parallel light\n" in lines
+
+
+def _stopped(*_, **__):
+    raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize(
+    ("stops", "left"),
+    [(0, "nothing was written"), (2, "OUT has csv, opencv, complete")],
+)
+def test_an_interrupted_export_names_what_is_complete(
+    plain, tmp_path, monkeypatch, stops, left
+):
+    names = ["csv", "opencv", "usd", "ros"]
+    (form,) = [each for each in export_formats.FORMATS if each.name == names[stops]]
+    monkeypatch.setattr(type(form), "files", _stopped)
+    monkeypatch.setattr(console, "leave", sys.exit)
+    done = export(plain, "--to", ",".join(names), "-o", tmp_path)
+    assert done.exit_code == 130
+    assert left.replace("OUT", str(tmp_path)) in " ".join(done.output.split())
+
+
+def test_an_interrupted_family_says_how_many_heads_there_are(tmp_path, monkeypatch):
+    def written(path, **_):
+        if path.name == "head-03.obj":
+            raise KeyboardInterrupt
+        path.write_text("")
+
+    monkeypatch.setattr("planning.cli.other_commands.write_sample", written)
+    monkeypatch.setattr(console, "leave", sys.exit)
+    words = ["sample", "--family", "5", "-o", str(tmp_path / "heads")]
+    done = CliRunner().invoke(commands, words)
+    assert done.exit_code == 130
+    assert "heads has 2 of 5 heads" in " ".join(done.output.split())
+    assert len(list((tmp_path / "heads").iterdir())) == 2
 
 
 def test_files_of_an_older_export_go_and_a_users_stay(folder, plain, tmp_path):

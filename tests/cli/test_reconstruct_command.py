@@ -317,6 +317,19 @@ def test_errors_are_one_line_with_the_documented_code(
     assert message in " ".join(err.split())
 
 
+def test_an_interrupted_run_says_that_images_are_left(folder, tmp_path, monkeypatch):
+    def rendered(*_, save, **__):
+        (save.path / "00-white.png").write_bytes(b"")
+        raise KeyboardInterrupt
+
+    command = "planning.cli.checks.reconstruct_command"
+    monkeypatch.setattr(f"{command}.reconstruct_rendered", rendered)
+    monkeypatch.setattr("planning.cli.console.leave", sys.exit)
+    code, _, err = run(folder, "-o", tmp_path / "x", "--save-captures", tmp_path / "y")
+    assert code == 130
+    assert f"{tmp_path / 'y'} has the images" in " ".join(err.split())
+
+
 @pytest.mark.long
 def test_a_rig_is_refined_said_and_written_as_a_calibration(rigs, folder, simulated):
     """C2 stands 0.6 mm beside its place; one projector lights all."""

@@ -5,8 +5,8 @@ is smaller than asked, 2 unwritable, 3 a bad plan, calibration or folder of capt
 """
 
 import json
-from collections.abc import Mapping
-from contextlib import ExitStack
+from collections.abc import Generator, Mapping
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -74,6 +74,7 @@ def reconstruct_command(options: Mapping[str, Any]) -> int:
         for place in (folder, options["save_captures"]):
             if place is not None:
                 folders.enter_context(writable(place))
+        folders.enter_context(_images_told(options["save_captures"]))
         try:
             result, twice = _reconstruct(plan, scanner, options, report)
         except CapturesError:
@@ -106,6 +107,18 @@ def reconstruct_command(options: Mapping[str, Any]) -> int:
             ]
         click.echo("\n".join([*lines, _summary(plan, result, deviation, files)]))
     return 0 if result.passed else 1
+
+
+@contextmanager
+def _images_told(folder: Path | None) -> Generator[None]:
+    """Let an interrupted run say that images are left of it."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        if folder is None or not any(folder.iterdir()):
+            raise
+        told = f"interrupted; {folder} has the images that were rendered before"
+        raise KeyboardInterrupt(told) from None
 
 
 def _deviation(

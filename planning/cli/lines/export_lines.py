@@ -1,6 +1,6 @@
 """What `plan export` does, and prints of each format."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -31,11 +31,15 @@ def export_command(options: Mapping[str, Any]) -> int:
     if targets == (NAME,):
         return _mitsuba_alone(rig, options["output"] or path.parent / NAME, options)
     base = options["output"] or path.parent / _FOLDER
-    report = reporter(quiet=options["quiet"])
     written: list[Exported] = []
-    for name in targets:
-        report(f"writing {name}")
-        written.append(_written(rig, name, base / name, options))
+    try:
+        for one in _each(rig, base, options):
+            written.append(one)
+    except KeyboardInterrupt:
+        if not written:
+            raise
+        done = ", ".join(each.name for each in written)
+        raise KeyboardInterrupt(f"interrupted; {base} has {done}, complete") from None
     if options["as_json"]:
         print_json(
             {
@@ -55,6 +59,15 @@ def export_command(options: Mapping[str, Any]) -> int:
         click.echo("\n".join(line for each in written for line in _lines(each)))
         click.echo(f"frame: {frame.words}; each README.txt has axes and units")
     return int(any(each.lacks for each in written))
+
+
+def _each(
+    rig: ExportedRig, base: Path, options: Mapping[str, Any]
+) -> Iterator[Exported]:
+    report = reporter(quiet=options["quiet"])
+    for name in options["targets"]:
+        report(f"writing {name}")
+        yield _written(rig, name, base / name, options)
 
 
 def _written(
