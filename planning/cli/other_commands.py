@@ -21,7 +21,7 @@ from planning.cache.entries import FolderEntries
 from planning.model.errors import InputError
 from planning.model.files import write_atomically
 from planning.model.plan import RigPlan
-from planning.model.words import count_words
+from planning.model.words import count_words, shell_word
 from planning.verify.board_images.board import board_for
 from planning.verify.board_images.board_lines import (
     board_document,
@@ -108,7 +108,8 @@ def sample_family_command(folder: Path, faces: int, count: int, seed: int) -> in
         raise KeyboardInterrupt(told) from None
     click.echo(
         f"wrote {folder}: {count_words(count, 'head')} in millimetres, from child to "
-        f"adult; `plan --mesh {folder} --max-projectors 5` plans one rig for all"
+        f"adult; `plan --mesh {shell_word(folder)} --max-projectors 5` plans one rig "
+        f"for all"
     )
     return 0
 

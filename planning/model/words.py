@@ -1,7 +1,9 @@
-"""Quantities as a person reads them."""
+"""Quantities as a person reads them, and paths as a shell does."""
 
 import math
+import shlex
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 # Areas below this are told in mm² [m²].
 _SMALL_M2 = 1e-4
@@ -17,6 +19,12 @@ def area_words(area_m2: float) -> str:
 def count_words(count: int, noun: str) -> str:
     """Return a count with its noun, in the plural unless it is 1."""
     return f"{count} {noun}{'s' * (count != 1)}"
+
+
+def shell_word(path: Path | str) -> str:
+    """Return a path to paste into a command, which takes it for no option of its."""
+    text = str(path)
+    return shlex.quote(f"./{text}" if text.startswith("-") else text)
 
 
 def tenths(numbers: Iterable[float]) -> list[float]:

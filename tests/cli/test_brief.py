@@ -2,6 +2,7 @@
 
 import io
 import re
+import shlex
 
 import pytest
 from rich.console import Console
@@ -53,6 +54,16 @@ CHANGES = {
         "cameras"
     ].update(continuous=None),
 }
+
+
+@pytest.mark.parametrize("folder", ["out", "it's part 7", "-x"])
+def test_the_commands_that_it_names_can_be_pasted(plan, folder):
+    """A shell takes the folder as one word, and the command as no option."""
+    end = " ".join(brief(plan, [f"{folder}/plan.json"], []).splitlines()[-2:])
+    show, verify = map(shlex.split, re.findall(r"`(plan .+?)`(?= checks|: )", end))
+    place = {"-x": "./-x"}.get(folder, folder)
+    assert show == ["plan", "show", place, "--all"]
+    assert verify == ["plan", "verify", place]
 
 
 @pytest.mark.parametrize("what", CHANGES)

@@ -10,6 +10,7 @@ import click
 
 from planning.cli.console import given
 from planning.model.errors import InfeasibleLimitsError, InputError, RigError
+from planning.model.words import shell_word
 from planning.rig.object_size import ObjectSize
 from planning.rig.rig import Rig, load_rig
 from planning.rig.toml.catalogue import catalogue, split_camera
@@ -64,9 +65,10 @@ def new_rig_command(options: Mapping[str, Any]) -> int:
     lines = [f"wrote {path}; chosen for you, to change there:"]
     lines += [f"  {line}" for line in (*chosen, *more)]
     lines += [*_warnings(path, answers.object_mm), "try"]
+    word = shell_word(path)
     lines += [
-        f"  plan lens --mesh FILE --rig {path}    does it suit your object?",
-        f"  plan --mesh FILE --max-projectors 6 --rig {path}",
+        f"  plan lens --mesh FILE --rig {word}    does it suit your object?",
+        f"  plan --mesh FILE --max-projectors 6 --rig {word}",
     ]
     click.echo("\n".join(lines))
     return 0

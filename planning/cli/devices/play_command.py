@@ -19,6 +19,7 @@ from planning.cli.console import reporter
 from planning.model.errors import CapturesError, InputError
 from planning.model.files import reading
 from planning.model.progress import Report
+from planning.model.words import shell_word
 
 _MANIFEST = "sequence.json"
 _INTERRUPTED = 130
@@ -125,11 +126,10 @@ def play_command(options: Mapping[str, Any]) -> int:
     finally:
         window.close()
     if capture is not None:
-        plan = options["directory"]
+        plan, images = shell_word(options["directory"]), shell_word(capture.folder)
         click.echo(
             f"{capture.folder}: {len(sequence.frames)} frames of {sequence.projector}; "
-            f"after the other projectors: plan reconstruct {plan} --captures "
-            f"{capture.folder}"
+            f"after the other projectors: plan reconstruct {plan} --captures {images}"
         )
     return 0
 

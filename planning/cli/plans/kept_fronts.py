@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from planning.model.front import Front
-from planning.model.words import count_words
+from planning.model.words import count_words, shell_word
 from planning.steps.front.kept_front import FRONT_FILE, KeptFront, read_front
 from planning.steps.front.taken_point import TakenPoint
 
@@ -27,7 +27,7 @@ def taken_point(count: tuple[int, int], folder: Path) -> TakenPoint:
     if not (folder / FRONT_FILE).exists():
         raise click.UsageError(
             f"--take {count[0]},{count[1]}: {folder} keeps no front ({FRONT_FILE}); "
-            f"make it with --pareto -o {folder}, or name its folder with -o"
+            f"make it with --pareto -o {shell_word(folder)}, or name its folder with -o"
         )
     kept = read_front(folder)
     point = kept.front.point(*count)

@@ -11,7 +11,7 @@ import numpy as np
 
 from geometry.poses import horizontal_axes
 from planning.model.plan import RigPlan
-from planning.model.words import count_words, share_words, tenths
+from planning.model.words import count_words, share_words, shell_word, tenths
 from planning.report.tolerance.joint_lines import joint_words
 from planning.report.tolerance.robust_lines import robust_cost
 from planning.report.tolerance.survival_lines import by_several_pairs, losses_words
@@ -33,6 +33,8 @@ _LABEL = 9
 # Lines of a block that a longer text is cut to; devices that are told whatever else is.
 _MOST_OF_BLOCK, _FEWEST_DEVICES = 3, 2
 _ELSEWHERE = "plan show"
+# Stands for a space at which no line is broken; no path holds it.
+_UNBROKEN = "\0"
 
 
 def brief(plan: RigPlan, files: Sequence[str], missed: Sequence[str]) -> str:
@@ -68,6 +70,7 @@ def _block(label: str, text: str, most: int) -> list[str]:
     if len(lines) > most:
         last = wrap(lines[most - 1], COLUMNS - _LABEL - 4, break_on_hyphens=False)[0]
         lines = [*lines[: most - 1], f"{last} ..."]
+    lines = [line.replace(_UNBROKEN, " ") for line in lines]
     return [f"{'' if k else label:<{_LABEL}}{line}" for k, line in enumerate(lines)]
 
 
@@ -253,9 +256,10 @@ def _end(plan: RigPlan, files: Sequence[str]) -> Iterator[Block]:
         return
     folder = Path(files[0]).parent
     yield "FILES", f"{folder}: {', '.join(Path(one).name for one in files)}", 2
+    word = shell_word(folder).replace(" ", _UNBROKEN)
     yield (
         "MORE",
-        f"`{_ELSEWHERE} {folder} --all`: proofs, regions, rings, cost; `plan verify "
-        f"{folder}` checks it again",
+        f"`{_ELSEWHERE} {word} --all`: proofs, regions, rings, cost; `plan verify "
+        f"{word}` checks it again",
         2,
     )
