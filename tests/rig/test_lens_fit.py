@@ -57,6 +57,15 @@ def write(tmp_path):
     return written
 
 
+@pytest.mark.parametrize(("radius", "images"), [(0.22, 1), (0.26, 1), (0.262, 2)])
+def test_an_object_that_one_image_shows_takes_one(radius, images):
+    """The ball is wider than the field at its front, 0.423 m, but farther away."""
+    fit = fit_of(load_rig(), "projector", ObjectSize.ball(radius))
+    assert fit.field_m[1] == pytest.approx(0.4231, abs=1e-4)
+    assert fit.images == images
+    assert (fit.standoff_that_holds_m <= fit.standoff_m) == (images == 1)
+
+
 @pytest.mark.parametrize(("near", "far"), [(0.95, 1.18), (0.3, 0.31), (1.0, 9.0)])
 @pytest.mark.parametrize("focal", [0.012, 0.035])
 def test_the_least_stop_is_sharp_from_end_to_end_and_no_wider_one_is(near, far, focal):

@@ -82,6 +82,8 @@ class LensFit:
     @property
     def images(self) -> int:
         """Images side by side that one view of the whole object takes."""
+        if self.device.holds_ball(self.radius_m, self.middle_m):
+            return 1
         long, short = self.size.sides_m
         fields = self.field_m, self.field_m[::-1]
         return min(
