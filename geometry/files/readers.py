@@ -17,6 +17,8 @@ from .formats import SUPPORTED, read_format
 from .reading import METRES, FormatError, RawMesh
 
 UNITS = ("mm", "cm", "m", "in", "um")
+# What stands for the unit where the size is given.
+_BY_SIZE = "size_mm"
 SIZE_RANGE_M = (1e-3, 100.0)
 
 _DEFAULT_UNIT = "mm"
@@ -90,7 +92,7 @@ def usable_mesh(
     name = unit or raw.unit or _DEFAULT_UNIT
     scale = METRES[name]
     if size_mm is not None:
-        name, scale = "size_mm", 1e-3 * size_mm / longest
+        name, scale = _BY_SIZE, 1e-3 * size_mm / longest
     _check_size(path, longest, name, scale)
     mesh = TriangleMesh(mesh.vertices * scale, mesh.faces)
     # Orientation turns faces and keeps their order, so that the origin stays theirs.
@@ -151,11 +153,12 @@ def _check_size(path: str | Path, longest: float, unit: str, scale: float) -> No
     fits = low <= longest * METRES[likely] <= high
     remedy = (
         f"--unit {likely} would make it {_length(longest * METRES[likely])}"
-        if fits and likely != unit
+        if fits and unit not in (likely, _BY_SIZE)
         else "state its true size with --size-mm"
     )
+    by = "by --size-mm" if unit == _BY_SIZE else f"in unit {unit}"
     raise MeshError(
-        f"{path}: the longest side is {_length(longest * scale)} in unit {unit}, "
+        f"{path}: the longest side is {_length(longest * scale)} {by}, "
         f"must be {_length(low)} to {_length(high)}; {remedy}"
     )
 

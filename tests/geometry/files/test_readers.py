@@ -165,6 +165,14 @@ def test_an_implausible_size_is_refused_with_the_unit_that_makes_sense(
     assert str(path) in str(caught.value)
 
 
+def test_an_implausible_size_that_was_given_is_named_as_given(tmp_path: Path) -> None:
+    brick().export(tmp_path / "face.obj")
+    with pytest.raises(MeshError) as caught:
+        load_mesh(tmp_path / "face.obj", size_mm=1e9)
+    rule = "1e+06 m by --size-mm, must be 1 mm to 100 m; state its true size with"
+    assert rule in str(caught.value)
+
+
 def test_scenes_keep_every_body_where_its_transform_puts_it(tmp_path: Path) -> None:
     scene = trimesh.Scene()
     mirror = np.diag([-1.0, 1.0, 1.0, 1.0])
