@@ -66,6 +66,18 @@ def test_the_commands_that_it_names_can_be_pasted(plan, folder):
     assert verify == ["plan", "verify", place]
 
 
+def test_a_target_of_less_than_a_percent_is_told_by_its_area(plan):
+    def choose(document):
+        chosen = {"kind": "faces", "source": None, "sha256": None, "n_faces": 1}
+        chosen |= {"area_m2": 2e-6, "n_removed_by_repair": 0}
+        document["surface"]["selection"] = chosen
+        for which, area in (("target", 2e-6), ("surface", 1e-2)):
+            document["coverage"][which]["area_m2"] = area
+
+    text = " ".join(brief(changed(plan, choose), FILES, []).split())
+    assert "target: the 2 mm² of the surface that you chose" in text
+
+
 @pytest.mark.parametrize("what", CHANGES)
 def test_it_is_short_and_begins_with_the_verdict(plan, what):
     one = changed(plan, CHANGES[what])

@@ -3,7 +3,7 @@
 from planning.model.document.certificates import Certificate
 from planning.model.document.input_records import SelectionRecord
 from planning.model.plan import RigPlan
-from planning.model.words import count_words, labelled, percent
+from planning.model.words import area_words, count_words, labelled, percent
 from planning.report.tolerance.survival_lines import surviving_proofs
 from planning.scene.lights import light_of
 
@@ -90,7 +90,9 @@ def user_selection(plan: RigPlan) -> SelectionRecord | None:
 def target_words(plan: RigPlan) -> str:
     """Return what is to be measured, and how all of it is asked for."""
     coverage = plan.coverage
-    share = percent(coverage.target.area_m2 / coverage.surface.area_m2, decimals=0)
+    part = coverage.target.area_m2 / coverage.surface.area_m2
+    small = area_words(coverage.target.area_m2)
+    share = percent(part, decimals=0) if part >= 0.01 else small
     if user_selection(plan) is not None:
         return f"the {share} of the surface that you chose"
     if plan.requirements.target == "surface":
