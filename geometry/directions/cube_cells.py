@@ -11,13 +11,13 @@ from scipy.sparse.csgraph import connected_components
 from geometry.arrays import Array, Ints, Mask, Words
 from geometry.rays.rays import equal_parts
 
-from .cube_map import FACES, CubeMap, face_coordinates
+from .cube_map import FACES, CubeMap, face_coordinates, in_faces
 from .product_signs import WORD, unpacked
 
 # Gnomonic coordinates are exact to this; whatever comes as near as this is met.
 _MARGIN = 1e-7
-# Segments whose cells are listed at a time.
-_SEGMENTS = 1 << 16
+# Segments whose cells are listed at a time: they stay in the second-level cache.
+_SEGMENTS = 1 << 14
 
 
 def mark_segments(
@@ -33,29 +33,28 @@ def mark_segments(
     # Column by column: rows of three are too short for numpy's loops.
     starts, ends = (np.ascontiguousarray(each.T).T for each in (starts, ends))
     for part in equal_parts(len(starts), _SEGMENTS):
-        for face in range(FACES):
-            first, second, met = _clipped(starts[part], ends[part], face)
-            segment, column, low, high = _by_column(cube, first, second)
-            begin = (owners[part][met] * FACES + face) * cube.n * cube.n
-            begin = begin.take(segment) + column + low * cube.n
-            _, cells = _spread(begin, high - low + 1, cube.n)
-            flat[cells] = True
+        first, second, met, face = _clipped(starts[part], ends[part])
+        segment, column, low, high = _by_column(cube, first, second)
+        begin = (owners[part][met] * FACES + face) * cube.n * cube.n
+        begin = begin.take(segment) + column + low * cube.n
+        _, cells = _spread(begin, high - low + 1, cube.n)
+        flat[cells] = True
 
 
-def _clipped(starts: Array, ends: Array, face: int) -> tuple[Array, Array, Ints]:
-    """Return gnomonic ends, (2, m'), of the parts of segments on a face, and whose."""
-    met = _may_meet(starts, ends, face)
-    a, b = (
-        np.stack([axis.take(met) for axis in face_coordinates(vectors, face)])
-        for vectors in (starts, ends)
-    )
+def _clipped(starts: Array, ends: Array) -> tuple[Array, Array, Ints, Ints]:
+    """Return gnomonic ends, (2, m'), of segments on each face, whose and on which."""
+    of_faces = [_may_meet(starts, ends, face) for face in range(FACES)]
+    met = np.concatenate(of_faces)
+    face = np.repeat(np.arange(FACES), [each.size for each in of_faces])
+    a, b = (in_faces(vectors, met, face) for vectors in (starts, ends))
     first, second = _gnomonic(a), _gnomonic(a + (b - a))
     # Most lie on the face from end to end.
     out = np.flatnonzero(~(_on_face(a) & _on_face(b)))
     a, b = a.take(out, axis=1), b.take(out, axis=1)
     first[:, out], second[:, out] = _clipped_ends(a, b)
     kept = np.flatnonzero(~np.isnan(first[0]))
-    return first.take(kept, axis=1), second.take(kept, axis=1), met[kept]
+    first, second = first.take(kept, axis=1), second.take(kept, axis=1)
+    return first, second, met[kept], face[kept]
 
 
 def _gnomonic(vectors: Array) -> Array:

@@ -271,6 +271,15 @@ def face_coordinates(vectors: Array, face: int) -> tuple[Array, Array, Array]:
     return vectors[..., axes[0]], vectors[..., axes[1]], z
 
 
+def in_faces(vectors: Array, chosen: Ints, faces: Ints) -> Array:
+    """Return x, y, z of chosen vectors, each in the frame of a face, shape (3, m)."""
+    columns = np.ascontiguousarray(vectors.T)
+    places = _AXES.T.take(faces, axis=1) * len(vectors) + chosen
+    found = columns.reshape(-1).take(places)
+    found[2] *= _SIGNS.take(faces)
+    return found
+
+
 def angle_between(a: Array, b: Array) -> Array:
     """Return the angle between unit vectors, accurate for small ones too."""
     chord = lengths(a - b)
