@@ -175,5 +175,6 @@ def _given(block: Rows, x: ca.MX) -> tuple[ca.MX, ca.DM]:
 
 def _constant(matrix: sparse.csc_array) -> ca.DM:
     # From scipy's matrices it copies number by number, and twenty times as long.
+    height, width = np.shape(matrix)
     at = matrix.indptr.tolist(), matrix.indices.tolist()
-    return ca.DM(ca.Sparsity(*matrix.shape, *at), ca.DM(matrix.data))
+    return ca.DM(ca.Sparsity(height, width, *at), ca.DM(matrix.data))
