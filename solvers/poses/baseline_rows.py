@@ -8,6 +8,7 @@ scatters: to differentiate the whole takes longer than to solve it.
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import cast
 
 import casadi as ca
 import numpy as np
@@ -175,6 +176,8 @@ def _given(block: Rows, x: ca.MX) -> tuple[ca.MX, ca.DM]:
 
 def _constant(matrix: sparse.csc_array) -> ca.DM:
     # From scipy's matrices it copies number by number, and twenty times as long.
-    height, width = np.shape(matrix)
-    at = matrix.indptr.tolist(), matrix.indices.tolist()
-    return ca.DM(ca.Sparsity(height, width, *at), ca.DM(matrix.data))
+    height, width = cast(tuple[int, int], matrix.shape)
+    ends, rows = (
+        cast(list[int], each.tolist()) for each in (matrix.indptr, matrix.indices)
+    )
+    return ca.DM(ca.Sparsity(height, width, ends, rows), ca.DM(matrix.data))
