@@ -1,10 +1,10 @@
-"""Sparse rows of dense matrices, as scipy makes them."""
+"""Sparse rows of dense matrices, as scipy makes them, and transposes of these."""
 
 import numpy as np
 import pytest
 from scipy import sparse
 
-from solvers.bit_rows import sparse_rows
+from solvers.bit_rows import sparse_rows, transposed
 
 
 @pytest.mark.parametrize("shape", [(0, 3), (3, 0), (1, 1), (40, 7), (7, 40)])
@@ -23,3 +23,11 @@ def test_rows_are_those_of_scipy(shape, layout):
         own, other = getattr(found, name), getattr(expected, name)
         assert own.dtype == other.dtype
         np.testing.assert_array_equal(own, other)
+
+
+@pytest.mark.parametrize("shape", [(0, 3), (3, 0), (7, 40), (256, 5), (700, 30)])
+def test_transposes_are_those_of_numpy(shape):
+    dense = np.random.default_rng(sum(shape)).random(shape) < 0.3
+    turned = transposed(dense)
+    assert turned.flags.c_contiguous
+    np.testing.assert_array_equal(turned, dense.T)
