@@ -56,7 +56,7 @@ _MOST_SHOWN = 60
 _NO_FIGURES = {"name", "device", "description", "sources", "count", "cost"}
 # No length in mm, angle or number of pixels or poses is as large; squares of what is
 # larger by far overflow.
-_LARGEST = 1e9
+LARGEST = 1e9
 UpName = Literal["x", "y", "z", "-x", "-y", "-z"]
 
 
@@ -96,9 +96,9 @@ class Table(BaseModel):
     def _check_sizes(self) -> Self:
         for name in type(self).model_fields:
             for value in _numbers(getattr(self, name)):
-                if abs(value) > _LARGEST:
+                if abs(value) > LARGEST:
                     raise ValueError(
-                        f"{name}: {value:g} is out of range; at most {_LARGEST:g}"
+                        f"{name}: {value:g} is out of range; at most {LARGEST:g}"
                     )
         return self
 

@@ -20,6 +20,7 @@ from planning.model.requirements import (
     TriangulationLimits,
     Workspace,
 )
+from planning.model.table_types import LARGEST
 from planning.scene.workspace.zone_conflicts import check_zones
 
 from .rig_tables import LimitsTable, RequirementsTable, RigTable
@@ -295,8 +296,8 @@ def _check_choice(name: str, value: str, known: tuple[str, ...]) -> None:
 
 
 def _check_positive(name: str, value: float) -> None:
-    if not 0.0 < value < math.inf:
-        raise InputError(f"{name} = {value} must be positive and finite")
+    if not 0.0 < value <= LARGEST:
+        raise InputError(f"{name} = {value} must be over 0 and {LARGEST:g} at most")
 
 
 def _share(

@@ -620,6 +620,7 @@ def test_limits_can_be_switched_off(write):
         {"region_coverage": math.nan},
         {"accuracy_mm": 0.0},
         {"accuracy_mm": math.nan},
+        {"accuracy_mm": 1e150},
         {"max_projectors": 0},
         {"max_cameras": 0},
         {"tau_m": math.nan},

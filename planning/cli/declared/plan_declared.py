@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from planning.cli.console import (
+    Finite,
     Positive,
     Share,
     output_options,
@@ -216,7 +217,7 @@ class GroupedCommand(click.Command):
 @click.option(
     "--accuracy",
     "accuracy_mm",
-    type=Positive(),
+    type=Finite(0.0, 1e9, min_open=True),
     metavar="MM",
     help="Largest standard deviation along the normal [default: 0.3].",
 )
