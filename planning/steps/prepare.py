@@ -83,7 +83,8 @@ def prepared_for(
         # The report asks for them, too.
         know_curvatures(mesh, field)
         regions = _regions(request, field)
-        clock.say(f"  {len(regions)} regions, {regions.dominant_share:.1%} of the area")
+        found = count_words(len(regions), "region")
+        clock.say(f"  {found}, {regions.dominant_share:.1%} of the area")
     scene = Scene(
         mesh,
         regions.face_region,

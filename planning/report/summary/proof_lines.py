@@ -118,7 +118,7 @@ def _regions(plan: RigPlan) -> str:
     removed = chosen.n_removed_by_repair
     gone = f" ({removed} chosen ones removed by repair)" if removed else ""
     regions = f"{count_words(n, 'region')} of your {by}{source}"
-    return f"{regions}: {chosen.n_faces} faces{gone}"
+    return f"{regions}: {count_words(chosen.n_faces, 'face')}{gone}"
 
 
 def _excluded(proof: Certificate) -> list[str]:
