@@ -47,7 +47,7 @@ PROVE = Effort(
     finest=11,
     maps=7,
     budget=4e10,
-    finer_budget=7e10,
+    finer_budget=4e10,
     shadows=np.inf,
     offers=150,
     starts=4,
@@ -145,7 +145,7 @@ def bound_projectors(
 def _leaves_room(bound: CellBound) -> bool:
     """Return whether fewer than the count weren't refuted, and finer maps may do so."""
     fewer = max(bound.count - 1, 1)
-    left = bound.status is not CellStatus.PROVED
+    left = bound.status is not CellStatus.PROVED and not bound.cut
     return left and bound.over_known >= (1.0 + _ROOM) * fewer
 
 

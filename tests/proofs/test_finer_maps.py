@@ -49,6 +49,10 @@ def test_none_are_asked_where_known_poses_may_nearly_be_enough(least, lit, prove
     assert least(FINER, 2, known) == proved
 
 
+def test_none_are_asked_where_the_work_ended_first(least):
+    assert least(replace(FINER, budget=1e5), 3) == 1
+
+
 def test_maps_that_would_be_too_large_arent_made(least, monkeypatch):
     monkeypatch.setattr(projector_bound, "_MAP_BYTES", 1e5)
     assert least(FINER, 3) == 1
