@@ -145,7 +145,7 @@ def bound_projectors(
 def _leaves_room(bound: CellBound) -> bool:
     """Return whether fewer than the count weren't refuted, and finer maps may do so."""
     fewer = max(bound.count - 1, 1)
-    left = bound.status is not CellStatus.PROVED and not bound.cut
+    left = bound.status is not CellStatus.PROVED and not bound.out_of_work
     return left and bound.over_known >= (1.0 + _ROOM) * fewer
 
 

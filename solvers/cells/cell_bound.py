@@ -59,8 +59,8 @@ class CellBound:
         by_multipliers: The part of the bound that they prove.
         over_known: The most that multipliers prove over the known poses alone; inf if
             none are known.
-        cut: Whether work ended the search for multipliers: finer cells would be of no
-            use.
+        out_of_work: Whether work ended the search for multipliers: finer cells would
+            be of no use.
         most_weight: Weight that ``count`` - 1 poses serve at most, by them.
         cells_used: Cells that the tree was asked for.
     """
@@ -76,7 +76,7 @@ class CellBound:
     largest_cost: int
     by_multipliers: float
     over_known: float
-    cut: bool
+    out_of_work: bool
     most_weight: float
     cells_used: int
 
@@ -242,7 +242,7 @@ class _Proof:
             largest_cost=search.largest_cost,
             by_multipliers=search.bound,
             over_known=search.over_known,
-            cut=search.cut,
+            out_of_work=search.out_of_work,
             most_weight=min(self.whole.in_unit(most), total),
             cells_used=np.union1d(self.store.names, self.seen).size,
         )

@@ -65,7 +65,7 @@ class MultiplierSearch:
         bound: The same, rounded up; inf if no number of poses is enough.
         over_known: The most that multipliers prove over the known poses alone, as far
             as was looked; no more can be proved over all. inf if none are known.
-        cut: Whether the last search ended with the work, and not with its cells.
+        out_of_work: Whether the last search ended with the work, not with its cells.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class MultiplierSearch:
         self.multipliers, self.largest_cost = np.zeros_like(whole.weights), 0
         self.ratio, self.bound = Fraction(0), 0.0
         self.over_known = float("inf") if known is None else 0.0
-        self.cut = False
+        self.out_of_work = False
         start = whole.multipliers(whole.weights / np.maximum(whole.needs, 1))
         self._record(start, store.costs(store.frontier, start))
 
@@ -118,7 +118,7 @@ class MultiplierSearch:
             if proposal.reached or not leaves.size:
                 break
             self._take(leaves)
-        self.cut = self._budget.exhausted
+        self.out_of_work = self._budget.exhausted
         return self.bound > n_poses
 
     def _between(self, proposal: _Proposed) -> NDArray[np.int64]:

@@ -32,20 +32,13 @@ class LitCells:
         self._steep = np.asfortranarray(target.steep)
         self._limits = limits
 
-    def admits(
-        self,
-        samples: NDArray[np.int64],
-        towards: _Array,
-        nearest: _Array,
-        psi: _Array,
-    ) -> NDArray[np.bool_]:
-        """Return which samples a projector in a cell may light, as `CellLimits`."""
-        return self.admitted(samples, towards, psi)[0]
-
     def admitted(
         self, samples: NDArray[np.int64], towards: _Array, psi: _Array
     ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Return the same, and which samples every part of a cell admits."""
+        """Return which samples a projector in a cell may light, and lights anywhere.
+
+        Each with its cell, as `CellLimits.admits` has them.
+        """
         cone = Cone.of(towards, psi)
         facing = dot(by_column(self._normals, samples), towards)
         facing = np.clip(facing, -1.0, 1.0)

@@ -55,7 +55,7 @@ class PositionTree(GrownTree):
         *,
         finest: int,
         closed: WidenedMaps | None = None,
-        limits: CellLimits | None = None,
+        limits: CellLimits | LitCells | None = None,
     ) -> None:
         self._workspace, self._range = workspace, range_m
         self._points = np.asfortranarray(points - np.array(workspace.centre))

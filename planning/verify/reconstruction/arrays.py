@@ -1,4 +1,4 @@
-"""Names for arrays, and values that are columns of equal length."""
+"""Names for arrays, columns of equal length, and trees of points."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
@@ -6,6 +6,7 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from geometry.arrays import rows_of
 
@@ -14,6 +15,13 @@ Mask = NDArray[np.bool_]
 Indices = NDArray[np.int64]
 Grey = NDArray[np.float32]
 Images = NDArray[np.uint8 | np.float32]
+# Points in a leaf of a tree: such a tree is made sooner, and answers sooner.
+_LEAF = 24
+
+
+def tree_of(points: NDArray[np.floating]) -> KDTree:
+    """Return a tree to ask for what is near of many points, shape (n, k)."""
+    return KDTree(points, leafsize=_LEAF, balanced_tree=False)
 
 
 @dataclass(frozen=True, eq=False)

@@ -55,7 +55,7 @@ def tighten(
     aim = min(target, total) * 0.998
     best = np.clip(start / weights, 0.0, 1.0)
     lowest, mean = bound(best)
-    taken, serves = np.flatnonzero(mean), by_set[np.flatnonzero(mean)].T
+    taken, serves = np.empty(0, dtype=np.int64), by_set[:0].T
     step, stale, mark = 1.0, 0, lowest
     for i in range(_MOST_STEPS):
         if lowest < target or budget.exhausted:

@@ -4,20 +4,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.sampling import SurfaceSamples
 from geometry.rays.proximity import closest_points
 from geometry.rays.rays import RayCaster
 from planning.model.requirements import CheckLimits
-from planning.verify.reconstruction.arrays import Array, Columns, Indices, Mask
+from planning.verify.reconstruction.arrays import Array, Columns, Indices, Mask, tree_of
 from planning.verify.reconstruction.cloud import Cloud
 from planning.verify.reconstruction.scanner import Scanner
 
 _MM = 1e3
-# Points in a leaf of their tree: such a tree answers sooner, and is made sooner.
-_LEAF = 24
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +134,7 @@ def nearest_distance(cloud: Cloud, samples: SurfaceSamples, reach_m: float) -> A
     best = np.full(len(samples), np.inf)
     for camera in np.unique(cloud.camera):
         seen = cloud.camera == camera
-        tree = KDTree(cloud.points[seen], leafsize=_LEAF, balanced_tree=False)
+        tree = tree_of(cloud.points[seen])
         distance, nearest = tree.query(samples.points, distance_upper_bound=reach_m)
         # Where nothing is in reach the index is one past the last point.
         rays = np.concatenate([cloud.rays[seen], np.zeros((1, 3))])[nearest]

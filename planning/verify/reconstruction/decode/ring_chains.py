@@ -3,10 +3,9 @@
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import KDTree
 
 from geometry.arrays import lengths
-from planning.verify.reconstruction.arrays import Array, Indices
+from planning.verify.reconstruction.arrays import Array, Indices, tree_of
 
 from .edges import ImageEdges
 from .triangulate import RingHits
@@ -17,8 +16,6 @@ _NEAR_PX = 2.6
 _NEXT_RING_PX = 100.0
 # Keeps rings apart when neighbours are looked for.
 _RING_APART_PX = 1000.0
-# Places in a leaf of their tree: such a tree answers in half of the time.
-_LEAF = 24
 
 
 def chains(
@@ -37,7 +34,7 @@ def chains(
         return length, across
     t = hits.distances[met]
     place = np.column_stack([edges.pixels[met], _RING_APART_PX * edges.rings[met]])
-    tree = KDTree(place, leafsize=_LEAF, balanced_tree=False)
+    tree = tree_of(place)
     one, other = tree.query_pairs(_NEAR_PX, output_type="ndarray").T
     run = lengths(place[one] - place[other]) * (t[one] / focal_px)
     linked = np.abs(t[one] - t[other]) <= max_slant * run
