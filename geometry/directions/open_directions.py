@@ -46,11 +46,15 @@ class DirectionLimits:
 
     Attributes:
         max_incidence: Largest angle to the normal [rad], below pi/2.
-        min_tangent_angle: Least angle to the line of the steep direction [rad].
+        min_tangent_angle: Least angle to the line of the steep direction [rad]; 0:
+            there is no such limit.
+        closely: Whether the cells at the edge of the cap of incidence are looked at
+            closely; else they are open.
     """
 
     max_incidence: float
     min_tangent_angle: float
+    closely: bool = True
 
 
 class OpenDirections:
@@ -116,8 +120,11 @@ class OpenDirections:
         reached = np.cos(np.minimum(limit + cube.radii, np.pi))
         for part in equal_parts(len(normals), _at_once(cube)):
             cosine = normals[part] @ cube.centres.T
-            np.greater_equal(cosine, np.cos(limit), out=within[part])
             np.greater_equal(cosine, reached, out=near[part])
+            if self._limits.closely:
+                np.greater_equal(cosine, np.cos(limit), out=within[part])
+        if not self._limits.closely:
+            return near
         near = np.greater(near, within)
         row, cell = np.divmod(np.flatnonzero(near), cube.size)
         meets = _arcs_come_within(cube, normals[row], cell, np.cos(limit) - _ROUNDING)
@@ -128,6 +135,8 @@ class OpenDirections:
     def _along_steep(self, steep: Array) -> Mask:
         """Return the cells that lie in a cap about +T1 or -T1 as a whole."""
         cube, n = self._cube, self._cube.n
+        if self._limits.min_tangent_angle <= 0.0:
+            return np.zeros((len(steep), cube.size), dtype=bool)
         least = np.cos(self._limits.min_tangent_angle) + _ROUNDING
         whole = np.zeros((len(steep), 6, n, n), dtype=bool)
         corners = cube.corners.reshape(-1, 3).T

@@ -7,9 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.document.certificates import Certificate, ContinuousProof
-from solvers.cells.cell_bound import CellBound, CellStatus, bound_count
+from solvers.cells.cell_bound import (
+    MOST_CELLS,
+    CellBound,
+    CellStatus,
+    bound_count,
+)
 from solvers.cells.cell_problem import CellProblem
 from solvers.cells.cell_tree import CellTree
+from solvers.cells.known_poses import proved_over
 
 from .candidate_certificate import Refutation, least_for_total
 from .quotas import Quotas, RegionFloors
@@ -40,6 +46,8 @@ class Effort:
             their cells are those that are searched.
         finer_budget: Counted work of another search among shadows, in maps and cells
             twice as fine, where known poses leave room for a proof.
+        where_room: What is spent instead, where known poses leave that room.
+        most_cells: Multisets of more aren't searched for long.
         starts: Searches for projectors between the bound and the count.
         aims: As `finest`, of the aims of cameras whose image the object overflows;
             None: cells aren't cut by aim.
@@ -52,6 +60,8 @@ class Effort:
     offers: int = 0
     maps: int = 0
     finer_budget: float = 0.0
+    where_room: "Effort | None" = None
+    most_cells: int = MOST_CELLS
     aims: int | None = None
     starts: int = 0
 
@@ -115,35 +125,50 @@ class BoundQuestion:
             reached & ~free,
         )
 
+    def room(self, known: NDArray[np.bool_], budget: float) -> float:
+        """Return by what share multipliers prove more than needed over known poses.
+
+        These are (k, n_rows). Over all poses it is no more; none or less, and no search
+        over cells proves the count by multipliers.
+        """
+        fewer = self.count - 1
+        if fewer < 1:
+            return float("inf")
+        problem = self._of_all(known.shape[1])
+        return proved_over(problem, known, fewer, budget) / fewer - 1.0
+
+    def _of_all(self, n_rows: int) -> CellProblem:
+        """What is required of all regions together, without their floors."""
+        return CellProblem(np.ones(n_rows), np.array([float(self.required)]))
+
     def searched(
         self,
         tree: CellTree,
         budget: float,
         known: NDArray[np.bool_] | None = None,
         *,
-        all_or_nothing: bool = False,
+        with_floors: bool = True,
+        most_cells: int = MOST_CELLS,
     ) -> CellBound:
         """Return what a search over cells of poses proves.
 
         What is required of all alone comes first: what it proves holds with floors,
         which are asked for where the known poses leave no room for a proof without.
         What some poses cover of the tree's samples, (k, n_rows), guides the search;
-        where they show that multipliers can't prove the count, all or nothing ends, and
-        floors aren't asked for.
+        multisets of at most so many cells are searched for long.
         """
-        required = np.array([float(self.required)])
-        problem = CellProblem(np.ones(tree.n_rows), required)
+        problem = self._of_all(tree.n_rows)
         bound = bound_count(
             problem,
             tree,
             self.count,
             known=known,
             budget=budget,
-            all_or_nothing=all_or_nothing,
+            most_cells=most_cells,
         )
         room = known is not None and bound.over_known > self.count - 1
         proved = bound.status is CellStatus.PROVED
-        if proved or room or all_or_nothing or not any(self.floors):
+        if proved or room or not (with_floors and any(self.floors)):
             return bound
         floored = CellProblem(
             np.ones(tree.n_rows),
@@ -159,6 +184,7 @@ class BoundQuestion:
             known=known,
             least=int(bound.lower_bound),
             budget=_WITH_FLOORS * budget,
+            most_cells=most_cells,
         )
         return again if again.lower_bound > bound.lower_bound else bound
 

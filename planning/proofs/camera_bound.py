@@ -125,6 +125,7 @@ def camera_trees(
             maps,
             finest=finest,
             limits=limits,
+            threads=scene.visibility.caster.threads,
         )
 
     # The roughest says soon whether shadows are needed at all.
@@ -146,7 +147,8 @@ def camera_trees(
 def _shadow_maps(scene: Scene, samples: Target, finest: int) -> WidenedMaps:
     """Directions that are open to samples; incidence is cameras' only limit of them."""
     cube = cube_map(1 << finest)
-    limits = DirectionLimits(scene.requirements.camera.max_incidence, 0.0)
+    incidence = scene.requirements.camera.max_incidence
+    limits = DirectionLimits(incidence, 0.0, closely=False)
     near = scene.requirements.workspace.camera_radius_m[0]
     opened = open_samples(scene, limits, samples, cube, shadows=True, nearest_m=near)
     return WidenedMaps(opened, cube)

@@ -17,6 +17,7 @@ from geometry.devices import ParallelModel
 from geometry.directions.cube_map import CubeMap, cube_map
 from geometry.directions.open_directions import DirectionLimits
 from geometry.directions.widened_maps import WidenedMaps
+from geometry.parallel import mapped
 from planning.model.devices.planned import PlannedProjector
 from planning.model.requirements import Workspace
 from planning.proofs.cells.direction_cells import (
@@ -37,9 +38,11 @@ from .all_poses import BoundQuestion, ContinuousBound, Effort
 
 _Tree = DirectionTree | PositionTree
 
-DEFAULT = Effort(
+_ROOMLESS = Effort(
     finest=8, maps=6, budget=3.5e9, shadows=3e8, most_samples=2000, starts=1
 )
+_ROOMY = replace(_ROOMLESS, finest=11, maps=7, budget=1.2e10, most_cells=3)
+DEFAULT = replace(_ROOMLESS, where_room=_ROOMY)
 # Share of the work for a search without shadows, where they can be drawn, and the level
 # that its cells end at: finer ones have refuted nothing there.
 _FIRST, _FIRST_FINEST = 0.3, 9
@@ -79,6 +82,9 @@ def bound_projectors(
     if question.count <= 1:
         # What is required takes one, with shadows or without: no cell is looked at.
         effort = replace(effort, finest=0, maps=0, shadows=0.0)
+    elif effort.where_room is not None and known is not None:
+        if question.room(known, effort.budget) >= _ROOM:
+            effort = effort.where_room
     reach, near = mesh_reach(scene), scene.requirements.workspace.projector_radius_m[0]
     devices = [template.device for template in templates]
     parallel = isinstance(devices[0], ParallelModel)
@@ -94,11 +100,14 @@ def bound_projectors(
         known: NDArray[np.bool_] | None,
         *,
         shadows: bool,
-        all_or_nothing: bool = False,
+        with_floors: bool = True,
     ) -> tuple[CellBound, _Tree]:
         cube = cube_map(1 << effort.maps)
         required = scene.requirements.projector
         limits = DirectionLimits(required.max_incidence, required.min_tangent_angle)
+        if not parallel:
+            # Cells of positions are held against the limits themselves.
+            limits = DirectionLimits(required.max_incidence, 0.0, closely=False)
         opened = open_samples(
             scene, limits, samples, cube, shadows=shadows, nearest_m=depth
         )
@@ -106,22 +115,27 @@ def bound_projectors(
             opened[~_within(cube, scene.requirements.workspace, aside)] = 0
             tree = DirectionTree.over(opened, len(samples))
         else:
-            maps = WidenedMaps(opened, cube), WidenedMaps(~opened, cube)
-            tree = _positions(scene, templates, samples, maps, effort.finest)
+            tree = _positions(scene, templates, samples, opened, cube, effort.finest)
         found = question.searched(
-            tree, effort.budget, known, all_or_nothing=all_or_nothing
+            tree,
+            effort.budget,
+            known,
+            with_floors=with_floors,
+            most_cells=effort.most_cells,
         )
         return found, tree
 
     # Shadows cost most, and what is proved without them holds with them.
-    first = effort
+    first, plain = effort, known
     if shadows:
         maps, finest = max(0, effort.maps - 1), min(effort.finest, _FIRST_FINEST)
         first = replace(effort, maps=maps, finest=finest, budget=_FIRST * effort.budget)
-    given_up = shadows and unshadowed is not None
-    plain = known if unshadowed is None else unshadowed
-    bound, tree = searched(first, plain, shadows=False, all_or_nothing=given_up)
-    if shadows and bound.status is not CellStatus.PROVED:
+        plain = known if unshadowed is None else unshadowed
+    guided = shadows and unshadowed is not None and plain is not None
+    found: tuple[CellBound, _Tree] | None = None
+    if not guided or question.room(plain, effort.budget) > 0.0:
+        found = searched(first, plain, shadows=False, with_floors=not guided)
+    if shadows and (found is None or found[0].status is not CellStatus.PROVED):
         among = searched(effort, known, shadows=True)
         finer = replace(
             effort,
@@ -133,8 +147,10 @@ def bound_projectors(
         if finer.budget and bits <= 8.0 * _MAP_BYTES and _leaves_room(among[0]):
             among = max(among, searched(finer, known, shadows=True), key=_proved)
         # Cut short, a longer search may have proved less.
-        if shadows := among[0].lower_bound >= bound.lower_bound:
-            bound, tree = among
+        if shadows := found is None or _proved(among) >= _proved(found):
+            found = among
+    assert found is not None
+    bound, tree = found
     unrefuted = np.empty((0, 3))
     if bound.status in (CellStatus.SURVIVED, CellStatus.CUT):
         unrefuted = _promising(bound, tree, effort.offers)
@@ -157,11 +173,13 @@ def _positions(
     scene: Scene,
     templates: Sequence[PlannedProjector],
     samples: Target,
-    maps: tuple[WidenedMaps, WidenedMaps],
+    rows: NDArray[np.uint64],
+    cube: CubeMap,
     finest: int,
 ) -> PositionTree:
-    """Return the cells of positions, by what is open to samples and what is closed."""
-    workspace, (opened, closed) = scene.requirements.workspace, maps
+    """Return the cells of positions, by the samples open to each cell of a map."""
+    workspace, threads = scene.requirements.workspace, scene.visibility.caster.threads
+    opened, closed = mapped(lambda of: WidenedMaps(of, cube), (rows, ~rows), threads)
     ranges = [template.device.range_m for template in templates]
     return PositionTree(
         workspace,
@@ -172,6 +190,7 @@ def _positions(
         finest=finest,
         closed=closed,
         limits=LitCells(samples, scene.requirements.projector),
+        threads=threads,
     )
 
 

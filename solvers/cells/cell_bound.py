@@ -25,7 +25,7 @@ from .cell_tuples import Enough, refute_tuples
 DEFAULT_BUDGET = 2e10
 # Multisets of more cells than these were never exhausted, with ten times the work that
 # all else takes: this share of the budget finds what survives, if that is soon found.
-_MOST_CELLS, _BRIEFLY = 5, 0.05
+MOST_CELLS, _BRIEFLY = 5, 0.05
 _MULTIPLIERS_SHARE = 0.75
 # A look for cells that survive: of so many poses at least, as of fewer multipliers soon
 # say all; multisets split at a time; and counted work, beside the budget.
@@ -91,7 +91,7 @@ def bound_count(
     least: int = 0,
     budget: float = DEFAULT_BUDGET,
     time_limit: float = float("inf"),
-    all_or_nothing: bool = False,
+    most_cells: int = MOST_CELLS,
 ) -> CellBound:
     """Prove that fewer than ``count`` poses can't be enough, or as much as holds.
 
@@ -104,8 +104,7 @@ def bound_count(
         least: Poses that were proved to be needed: no fewer are looked at.
         budget: Counted work, about 1e9 a second.
         time_limit: Wall time that cuts the work, in [s]; the proof then says so.
-        all_or_nothing: Whether to end at once where multipliers can't prove the count,
-            since fewer known poses may be enough.
+        most_cells: Multisets of more are searched briefly: multipliers get their work.
 
     Raises:
         ValueError: If the count isn't a whole number of at least 1, the tree has other
@@ -118,8 +117,8 @@ def bound_count(
             f"{problem.weights.size}"
         )
     limit = WorkBudget(budget, time_limit=time_limit)
-    proof = _Proof(problem, tree, count, limit, known, least)
-    return proof.run(all_or_nothing=all_or_nothing)
+    proof = _Proof(problem, tree, count, limit, known, least, most_cells)
+    return proof.run()
 
 
 class _Proof:
@@ -131,10 +130,12 @@ class _Proof:
         budget: WorkBudget,
         known: NDArray[np.bool_] | None,
         least: int,
+        most_cells: int,
     ) -> None:
         self.problem, self.tree, self.count, self.budget = problem, tree, count, budget
         self.whole = whole_rows(problem)
-        few = count - 1 <= _MOST_CELLS
+        self.most_cells = most_cells
+        few = count - 1 <= most_cells
         multipliers = _MULTIPLIERS_SHARE if few else 1.0 - _BRIEFLY
         share = budget.part(multipliers * budget.units)
         # Cells that are made count in both.
@@ -149,14 +150,11 @@ class _Proof:
         self.standing: NDArray[np.int64] | None = None
         self.seen = self.store.names
 
-    def run(self, *, all_or_nothing: bool) -> CellBound:
+    def run(self) -> CellBound:
         if not _reachable(self.whole, self.store):
             proof = "all cells together serve less than is required"
             return self._answer(CellStatus.INFEASIBLE, float("inf"), proof)
         most = self.count - 1
-        if all_or_nothing and self.search.may_be_enough(most):
-            proof = f"{self.proof}; {most} known poses may be enough"
-            return self._answer(CellStatus.CUT, float(self.lower), proof)
         if most >= _LOOKED_FOR:
             self._look(most)
             most -= self.standing is not None
@@ -203,7 +201,7 @@ class _Proof:
             self.proof = "multipliers of the rows"
             return True
         budget = self.budget
-        if n_poses > _MOST_CELLS:
+        if n_poses > self.most_cells:
             budget = budget.part(_BRIEFLY * budget.units)
         answer = refute_tuples(
             self.whole, self.store, n_poses, self.search.multipliers, budget

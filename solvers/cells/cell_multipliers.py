@@ -11,21 +11,18 @@ and column generation algorithms", Networks 49(1), 2007).
 """
 
 from fractions import Fraction
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.bit_rows import BitSum, GrowingArray, unpack_rows
 from solvers.status import WorkBudget
 
 from .cell_problem import WholeRows
-from .cell_program import MultiplierProgram
 from .cell_store import CellStore
+from .known_poses import TOLERANCE, KnownPoses, Proposed
 
-# Rows taken in hand at a time; cells that can't be split that cost too much, after
-# which others aren't looked at; and cells split at a time.
-_TAKEN = 100
+# Cells that can't be split that cost too much, after which others aren't looked at, and
+# cells split at a time.
 _ENOUGH = 40
 _SPLIT = 400
 # Where no poses are known: cells below each of which one that can't be split is taken.
@@ -33,19 +30,6 @@ _SPREAD = 100
 # How far from the best multipliers towards those proposed cells are first looked at:
 # proposals leap from one corner of the program to another, and each leap splits others.
 _STEP = 0.5
-_TOLERANCE = 1e-6
-
-
-class _Proposed(NamedTuple):
-    """Multipliers, what the dearest known pose costs by them, and whether poses reach.
-
-    If those in hand may be enough, no multipliers refute their number, though good ones
-    help whoever looks on.
-    """
-
-    multipliers: NDArray[np.int64]
-    largest_cost: int
-    reached: bool
 
 
 class MultiplierSearch:
@@ -63,8 +47,6 @@ class MultiplierSearch:
         largest_cost: Largest lambda(S) of the frontier then, hence of all poses.
         ratio: need(lambda) / M by these; at least so many poses, not rounded.
         bound: The same, rounded up; inf if no number of poses is enough.
-        over_known: The most that multipliers prove over the known poses alone, as far
-            as was looked; no more can be proved over all. inf if none are known.
         out_of_work: Whether the last search ended with the work, not with its cells.
     """
 
@@ -76,15 +58,20 @@ class MultiplierSearch:
         known: NDArray[np.uint64] | None = None,
     ) -> None:
         self._whole, self._store, self._budget = whole, store, budget
-        self._program = MultiplierProgram(whole, budget)
-        self._poses = GrowingArray(store.rows[:0] if known is None else known)
-        self._spread, self._taken = known is None, np.empty(0, dtype=np.int64)
+        rows = store.rows[:0] if known is None else known
+        self._poses = KnownPoses(whole, rows, budget)
+        self._known, self._spread = known is not None, known is None
+        self._taken = np.empty(0, dtype=np.int64)
         self.multipliers, self.largest_cost = np.zeros_like(whole.weights), 0
         self.ratio, self.bound = Fraction(0), 0.0
-        self.over_known = float("inf") if known is None else 0.0
         self.out_of_work = False
         start = whole.multipliers(whole.weights / np.maximum(whole.needs, 1))
         self._record(start, store.costs(store.frontier, start))
+
+    @property
+    def over_known(self) -> float:
+        """The most that multipliers prove over the known poses; inf if none are."""
+        return self._poses.most_proved if self._known else float("inf")
 
     def refute_most(self, n_poses: int) -> None:
         """Refute at once so many poses, or as many as poses in hand leave room for."""
@@ -95,14 +82,14 @@ class MultiplierSearch:
     def may_be_enough(self, n_poses: int) -> bool:
         """Return whether so many poses in hand are, as far as multipliers know."""
         self._prepare(n_poses)
-        proposal = self._proposed()
+        proposal = self._poses.proposed(n_poses)
         return proposal is not None and proposal.reached
 
     def refute(self, n_poses: int) -> bool:
         """Look for multipliers by which so many poses aren't enough."""
         self._prepare(n_poses)
         while self.bound <= n_poses and not self._budget.exhausted:
-            proposal = self._proposed()
+            proposal = self._poses.proposed(n_poses)
             if proposal is None:
                 break
             leaves = np.empty(0, dtype=np.int64)
@@ -110,7 +97,7 @@ class MultiplierSearch:
                 leaves = self._drilled(n_poses, self._between(proposal))
                 # Only what costs more than all poses known cuts the proposal off.
                 costs = self._store.costs(leaves, proposal.multipliers)
-                leaves = leaves[costs > proposal.largest_cost * (1.0 + _TOLERANCE)]
+                leaves = leaves[costs > proposal.largest_cost * (1.0 + TOLERANCE)]
             if not leaves.size and self.bound <= n_poses:
                 leaves = self._drilled(n_poses, proposal.multipliers)
             # What is in hand already would change nothing.
@@ -121,14 +108,13 @@ class MultiplierSearch:
         self.out_of_work = self._budget.exhausted
         return self.bound > n_poses
 
-    def _between(self, proposal: _Proposed) -> NDArray[np.int64]:
+    def _between(self, proposal: Proposed) -> NDArray[np.int64]:
         """Return multipliers on the way from the best ones to those proposed."""
         best = self.multipliers / max(1, self.largest_cost)
         proposed = proposal.multipliers / proposal.largest_cost
         return self._whole.multipliers(best + _STEP * (proposed - best))
 
     def _prepare(self, n_poses: int) -> None:
-        self._program.set_count(n_poses)
         if self._spread and self.bound <= n_poses:
             self._take(self._leaves_about())
             self._spread = False
@@ -136,28 +122,6 @@ class MultiplierSearch:
     def _take(self, leaves: NDArray[np.int64]) -> None:
         self._taken = np.concatenate([self._taken, leaves])
         self._poses.append(self._store.rows[leaves])
-
-    def _proposed(self) -> _Proposed | None:
-        """Return the multipliers of all poses; None if the work ended."""
-        while (proposal := self._program.solve()) is not None:
-            reached = proposal.value > -_TOLERANCE * self._whole.weights.size
-            multipliers = self._whole.multipliers(proposal.multipliers)
-            costs = BitSum(multipliers)(self._poses.values)
-            largest = int(costs.max(initial=0))
-            if largest and not self._taken.size:
-                least = float(self._whole.least_cost(multipliers) / largest)
-                self.over_known = max(self.over_known, least)
-            in_hand = np.zeros(costs.size, dtype=bool)
-            in_hand[self._program.poses] = True
-            most = int(costs[in_hand].max(initial=0))
-            costs[in_hand] = 0
-            dearest = np.argsort(-costs, kind="stable")[:_TAKEN]
-            dearest = dearest[costs[dearest] > most * (1.0 + _TOLERANCE)]
-            if reached or not dearest.size:
-                return _Proposed(multipliers, max(1, largest), reached)
-            rows = unpack_rows(self._poses.values[dearest], self._whole.weights.size)
-            self._program.add(dearest, rows)
-        return None
 
     def _drilled(
         self, n_poses: int, multipliers: NDArray[np.int64]

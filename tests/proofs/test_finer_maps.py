@@ -49,6 +49,14 @@ def test_none_are_asked_where_known_poses_may_nearly_be_enough(least, lit, prove
     assert least(FINER, 2, known) == proved
 
 
+@pytest.mark.parametrize(("lit", "proved"), [(0.4, 2), (0.85, 1)])
+def test_what_is_spent_where_known_poses_leave_room(least, lit, proved):
+    known = np.random.default_rng(0).random((40, N)) < lit
+    roomy = replace(COARSE, where_room=replace(COARSE, finest=6, maps=5))
+    assert least(roomy, 2, known) == proved
+    assert least(roomy, 2) == least(COARSE, 2)
+
+
 def test_none_are_asked_where_the_work_ended_first(least):
     assert least(replace(FINER, budget=1e5), 3) == 1
 

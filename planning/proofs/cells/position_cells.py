@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from geometry.arrays import by_column
 from geometry.directions.cube_map import FACES, circles, middles, widest
 from geometry.directions.widened_maps import WidenedMaps
+from geometry.parallel import mapped
 from planning.model.requirements import Workspace
 from planning.scene.workspace.admissible import may_be_admissible
 from solvers.bit_rows import parts
@@ -27,7 +28,7 @@ from .lit_cells import LitCells
 from .shell_cells import Facing, Seen, ShellCells, seen_from
 
 # Pairs of cell and sample looked at together: they stay in the second-level cache.
-PAIRS = 1 << 14
+PAIRS = 1 << 15
 
 
 class PositionTree(GrownTree):
@@ -43,6 +44,7 @@ class PositionTree(GrownTree):
         closed: Directions that aren't, widened: where none is near, parts of a cell
             need no look. None: all are looked at.
         limits: What else forbids samples; None: nothing.
+        threads: That look at cells; None: one for each core.
     """
 
     def __init__(
@@ -56,12 +58,13 @@ class PositionTree(GrownTree):
         finest: int,
         closed: WidenedMaps | None = None,
         limits: CellLimits | LitCells | None = None,
+        threads: int | None = None,
     ) -> None:
         self._workspace, self._range = workspace, range_m
         self._points = np.asfortranarray(points - np.array(workspace.centre))
         self._reach = float(np.linalg.norm(self._points, axis=1).max(initial=0.0))
         self._maps, self._closed = maps, closed
-        self._finest, self._limits = finest, limits
+        self._finest, self._limits, self._threads = finest, limits, threads
         whole, (low, high) = np.arange(FACES), radius_m
         faces = ShellCells(0 * whole, whole, np.full(FACES, low), np.full(FACES, high))
         super().__init__(faces, len(points))
@@ -108,13 +111,16 @@ class PositionTree(GrownTree):
         covered = sure.copy()
         # Numpy finds what isn't zero in one dimension five times as fast as in two.
         asked = np.flatnonzero(may & ~sure & admissible)
-        for some in parts(asked.size, PAIRS):
+
+        def look(some: slice) -> None:
             pairs = asked[some]
             cell, sample = np.divmod(pairs, self.n_rows)
             seen = self.seen_from(cells, facing, cell, sample)
             passed, certain = self._passed(seen, sample)
             covered.reshape(-1)[pairs[passed]] = True
             sure.reshape(-1)[pairs[passed[certain]]] = True
+
+        mapped(look, parts(asked.size, PAIRS), self._threads)
         return covered, sure
 
     def widths(self, names: NDArray[np.int64]) -> NDArray[np.float64]:

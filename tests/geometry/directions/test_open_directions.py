@@ -1,5 +1,7 @@
 """Cells open to a sample: no direction that passes lies in a closed one."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.plain_shapes import box, grid, joined, torus
@@ -63,6 +65,22 @@ MESHES = {
         shifted(grid(0.2, 0.1, divisions=(1, 1)), (0.02, 0, 0.03)),
     ),
 }
+
+
+def test_what_isnt_looked_at_closely_is_open_beyond_the_cap_by_a_cell_at_most():
+    cube, mesh = CubeMap(16), MESHES["ring"]
+    samples, _, closely = maps_of(mesh, cube, occlusion=False)
+    limits = replace(FREE, closely=False)
+    _, _, roughly = maps_of(mesh, cube, limits=limits, occlusion=False)
+    assert np.all(roughly >= closely)
+    assert np.sum(roughly) < 1.1 * np.sum(closely)
+    away = np.arccos(np.clip(samples.normals @ cube.centres.T, -1.0, 1.0))
+    more = roughly & ~closely
+    assert more.any()
+    assert np.all((away - cube.radii)[more] <= FREE.max_incidence + 1e-9)
+    _, _, shaded = maps_of(mesh, cube)
+    _, _, among = maps_of(mesh, cube, limits=limits)
+    assert np.all(among >= shaded)
 
 
 @pytest.mark.long

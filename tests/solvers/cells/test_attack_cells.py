@@ -96,6 +96,21 @@ def test_no_pose_leaves_the_set_of_its_cell_until_one_bit_is_cleared(
     assert {s for _, s in caught.violations} == {sample}
 
 
+def test_cells_are_the_same_by_any_number_of_threads(attack_cells, monkeypatch):
+    monkeypatch.setattr("planning.proofs.cells.position_cells.PAIRS", 64)
+    found = []
+    for threads in (1, 3):
+        scene, template, rows, _ = made(SHAPES["notched box"], "diverging", attack_cells)
+        scene.visibility.caster.threads = threads
+        tree = attack_cells.tree_of(scene, template, rows, 3)
+        names = tree.roots().cells
+        for _ in range(3):
+            names = tree.children(names).cells
+        found.append(tree.covered(names))
+    assert 0 < found[0].sum() < found[0].size
+    np.testing.assert_array_equal(*found)
+
+
 def without(tree, key, sample, attack_cells):
     """Clear a sample's bit in the finest cell that holds a pose."""
     if isinstance(tree, DirectionTree):

@@ -26,6 +26,7 @@ from solvers.cells.cell_problem import CellProblem, whole_rows
 from solvers.cells.cell_store import CellStore
 from solvers.cells.cell_subtrees import Subtrees
 from solvers.cells.cell_tuples import _split, refute_tuples
+from solvers.cells.known_poses import proved_over
 from solvers.status import WorkBudget
 
 DEG = np.pi / 180.0
@@ -266,9 +267,8 @@ def test_multisets_of_too_many_cells_are_left_and_said_to_be(monkeypatch):
         truth = fewest(problem, leaves, 4)
         whole = bound_count(problem, tree, 4)
         with monkeypatch.context() as patch:
-            patch.setattr(cell_bound, "_MOST_CELLS", 1)
             patch.setattr(cell_bound, "_BRIEFLY", 1e-9)
-            answer = bound_count(problem, tree, 4)
+            answer = bound_count(problem, tree, 4, most_cells=1)
         assert answer.lower_bound <= whole.lower_bound == min(truth, 4)
         if answer.status is CellStatus.CUT:
             left += 1
@@ -646,19 +646,17 @@ def test_threads_change_nothing(cap_trees, by_threads):
         assert getattr(one, name) == getattr(two, name)
 
 
-@pytest.mark.parametrize(("apart", "proved"), [(False, 0), (True, 2)])
-def test_all_or_nothing_asks_no_cell_where_a_known_pose_may_be_enough(apart, proved):
-    """More than half is wanted: a pose that serves both halves is enough alone."""
+@pytest.mark.parametrize(
+    ("poses", "n", "proved"), [(2, 1, 1.2), (1, 1, 1.0), (2, 2, 2.0)]
+)
+def test_what_multipliers_prove_over_some_poses(poses, n, proved):
+    """Six of ten are wanted, five of which a pose serves: 6/5, where one is asked."""
     halves = np.repeat(np.eye(2, dtype=bool), 5, axis=1)
-    known = halves if apart else np.ones((1, 10), dtype=bool)
-    tree = tree_of_leaves(np.array([-1, 0, 0]), pack_rows(halves), 10)
-    bound = bound_count(
-        CellProblem(np.ones(10), np.array([6.0])),
-        tree,
-        2,
-        known=known,
-        budget=PLENTY,
-        all_or_nothing=True,
-    )
-    asked = bound.cells_used > 1
-    assert (bound.lower_bound, asked) == (proved, apart)
+    known = halves if poses == 2 else np.ones((1, 10), dtype=bool)
+    problem = CellProblem(np.ones(10), np.array([6.0]))
+    assert proved_over(problem, known, n, PLENTY) == pytest.approx(proved)
+
+
+def test_without_work_nothing_is_known_of_poses():
+    problem = CellProblem(np.ones(2), np.array([1.0]))
+    assert proved_over(problem, np.ones((1, 2), dtype=bool), 1, 0.0) == np.inf
