@@ -41,7 +41,7 @@ _Tree = DirectionTree | PositionTree
 _ROOMLESS = Effort(
     finest=8, maps=6, budget=3.5e9, shadows=3e8, most_samples=2000, starts=1
 )
-_ROOMY = replace(_ROOMLESS, finest=11, maps=7, budget=1.2e10, most_cells=3)
+_ROOMY = replace(_ROOMLESS, finest=11, maps=7, budget=1.3e10, most_cells=3)
 DEFAULT = replace(_ROOMLESS, where_room=_ROOMY)
 # Share of the work for a search without shadows, where they can be drawn, and the level
 # that its cells end at: finer ones have refuted nothing there.
@@ -56,8 +56,9 @@ PROVE = Effort(
     starts=4,
 )
 # What the multipliers prove over candidates is this share more than they do over all
-# poses, and more than cells of any size prove. Bytes that finer maps may take.
-_ROOM, _MAP_BYTES = 0.05, 1.5e8
+# poses, and more than cells of any size prove; with less than the other, default work
+# ended first wherever that was tried. Bytes that finer maps may take.
+_ROOM, _WIDE_ROOM, _MAP_BYTES = 0.05, 0.075, 1.5e8
 
 
 def bound_projectors(
@@ -83,7 +84,7 @@ def bound_projectors(
         # What is required takes one, with shadows or without: no cell is looked at.
         effort = replace(effort, finest=0, maps=0, shadows=0.0)
     elif effort.where_room is not None and known is not None:
-        if question.room(known, effort.budget) >= _ROOM:
+        if question.room(known, effort.budget) >= _WIDE_ROOM:
             effort = effort.where_room
     reach, near = mesh_reach(scene), scene.requirements.workspace.projector_radius_m[0]
     devices = [template.device for template in templates]

@@ -202,6 +202,9 @@ class _Proof:
             return True
         budget = self.budget
         if n_poses > self.most_cells:
+            if self.search.out_of_work:
+                # Among as many cells as were made till then nothing is found soon.
+                return False
             budget = budget.part(_BRIEFLY * budget.units)
         answer = refute_tuples(
             self.whole, self.store, n_poses, self.search.multipliers, budget
