@@ -25,7 +25,7 @@ from .too_few import OptimisticCells
 _Make = Callable[[Ints, Skies | None], OptimisticCells]
 # Pixels from the middle to the rim of maps of what is blocked: the finer ones take four
 # times as long, and are drawn where the others leave cells open.
-_PIXELS = (100, 200)
+_PIXELS = (100, 200, 400)
 
 
 @dataclass(frozen=True, eq=False)
