@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from .row_columns import InColumns, in_slots
+
 _Array = NDArray[np.float64]
 _Index = NDArray[np.int64]
 Formula = Callable[[ca.SX, ca.SX], ca.SX]
@@ -30,14 +32,14 @@ class Kind:
         bends: (v, q, lambda) to the Hessian of lambda.g by v, (n, n).
     """
 
-    values: ca.Function
-    slopes: ca.Function
-    bends: ca.Function
+    values: InColumns
+    slopes: InColumns
+    bends: InColumns
 
     @property
     def n_values(self) -> int:
         """How many values r it has."""
-        return int(self.values.size1_out(0))
+        return int(self.values.function.size1_out(0))
 
 
 @lru_cache(maxsize=64)
@@ -50,9 +52,9 @@ def kind_of(formula: Formula, n_variables: int, n_data: int) -> Kind:
     bends = ca.densify(ca.hessian(ca.dot(weights, g), v)[0])
     shared = {"cse": True}
     return Kind(
-        ca.Function("values", [v, q], [g], shared),
-        ca.Function("slopes", [v, q], [slopes], shared),
-        ca.Function("bends", [v, q, weights], [bends], shared),
+        InColumns(ca.Function("values", [v, q], [g], shared)),
+        InColumns(ca.Function("slopes", [v, q], [slopes], shared)),
+        InColumns(ca.Function("bends", [v, q, weights], [bends], shared)),
     )
 
 
@@ -84,7 +86,7 @@ class Rows:
     def at(self, start: _Array) -> _Array:
         """Return the values at a start, shape (m, r)."""
         m = len(self.variables)
-        values = self.kind.values.map(m)(start[self.variables].T, self.data.T)
+        values = self.kind.values.function.map(m)(start[self.variables].T, self.data.T)
         return np.asarray(values, dtype=np.float64).reshape(-1, m, order="F").T
 
     def bounds(self, start: _Array) -> tuple[_Array, _Array]:
@@ -114,7 +116,7 @@ class StackedRows:
     def values(self, x: ca.MX) -> ca.MX:
         """Return g(x) + L x + c."""
         parts = [
-            ca.vec(block.kind.values.map(len(block.variables))(*_given(block, x)))
+            block.kind.values(len(block.variables), *_given(block, x))
             for block in self.blocks
         ]
         return ca.vertcat(*parts) + _constant(self.linear) @ x + ca.DM(self.constant)
@@ -124,8 +126,7 @@ class StackedRows:
         rows, columns, parts, first = [], [], [], 0
         for block in self.blocks:
             m, r, n = *_shape(block), block.variables.shape[1]
-            slopes = block.kind.slopes.map(m)(*_given(block, x))
-            parts.append(ca.vec(slopes))
+            parts.append(block.kind.slopes(m, *_given(block, x)))
             # Instance by instance, and of each column by column.
             row = first + np.arange(m * r).reshape(m, 1, r)
             rows.append(np.broadcast_to(row, (m, n, r)).ravel())
@@ -144,9 +145,9 @@ class StackedRows:
         rows, columns, parts, first = [of_own], [of_own], [own], 0
         for block in self.blocks:
             m, r = _shape(block)
-            lambdas = ca.reshape(weights[first : first + m * r], r, m)
-            bends = block.kind.bends.map(m)(*_given(block, x), lambdas)
-            parts.append(ca.vec(bends))
+            own_rows = in_slots(first + np.arange(m * r).reshape(m, r))
+            lambdas = weights[own_rows.tolist()]
+            parts.append(block.kind.bends(m, *_given(block, x), lambdas))
             # Symmetric: which of both comes first doesn't matter.
             n = block.variables.shape[1]
             rows.append(np.repeat(block.variables, n, axis=1).ravel())
@@ -169,9 +170,7 @@ def _shape(block: Rows) -> tuple[int, int]:
 
 
 def _given(block: Rows, x: ca.MX) -> tuple[ca.MX, ca.DM]:
-    m, n = block.variables.shape
-    gathered = x[block.variables.ravel().tolist()]
-    return ca.reshape(gathered, n, m), ca.DM(np.ascontiguousarray(block.data.T))
+    return x[in_slots(block.variables).tolist()], ca.DM(in_slots(block.data))
 
 
 def _constant(matrix: sparse.csc_array) -> ca.DM:
