@@ -141,7 +141,8 @@ def test_a_hole_is_where_a_part_ends_and_10_is_violated_until_it_is_closed():
     limits = BaselineLimits(THETA, 0.0, workspace())
     terms = HoleTerms(pair, measured, body.surface, hole, limits)
     problem = body.problem(offered=ring(7))
-    closed = hole_closing.closed(problem, CameraSet(pair, measured), 4)
+    begun = hole_closing.Closing.of(problem, CameraSet(pair, measured))
+    closed = hole_closing.closed(problem, begun, 4).placed
     assert problem.short(closed) == 0
     ends = list(terms.ends(np.zeros_like(measured, dtype=np.float64)))
     assert {seam.cameras for seam in ends} == {(0, 1), (1, 0)}

@@ -5,6 +5,8 @@ One program over all that may move, centres and aims, restores (10) at the hole
 lost are in the next program.
 """
 
+from dataclasses import dataclass, field
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -33,32 +35,59 @@ _FAILED = 6
 _WORTH = 0.1
 
 
+@dataclass(frozen=True, eq=False)
+class Closing:
+    """How far a hole is closed, and from where the next program goes on.
+
+    Attributes:
+        placed: The cameras.
+        reach: How far they may move [m].
+        lost: Samples that the program before lost.
+        failed: Programs that measured no more.
+    """
+
+    placed: CameraSet
+    reach: float
+    lost: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    failed: int = 0
+
+    @classmethod
+    def of(cls, problem: RouteProblem, placed: CameraSet) -> "Closing":
+        """Return what is begun with these cameras."""
+        return cls(placed, _REACH * problem.limits.workspace.camera_radius_m[1])
+
+
 def one_fewer(problem: RouteProblem, placed: CameraSet) -> CameraSet | None:
     """Return the best of one camera fewer, the hole closed; None where none may go."""
     free = placed.least_missed(problem.n_fixed)
-    begun = [placed.without(i) for i in free[: _DROPPED - 1]]
-    if begun and begun[0].cameras:
-        best = problem.best(len(begun[0].cameras)).tolist()
-        begun.insert(0, problem.placed([problem.offered[i] for i in best]))
-    tried: list[CameraSet] = []
+    fewer = [placed.without(i) for i in free[: _DROPPED - 1]]
+    if fewer and fewer[0].cameras:
+        best = problem.best(len(fewer[0].cameras)).tolist()
+        fewer.insert(0, problem.placed([problem.offered[i] for i in best]))
+    begun = [Closing.of(problem, one) for one in fewer]
+    tried: list[Closing] = []
     for programs, most in ((1, _DROPPED), (_PROGRAMS, _PURSUED)):
         for i, one in enumerate(begun[:most]):
             begun[i] = closed(problem, one, programs)
-            if not problem.short(begun[i]):
-                return begun[i]
+            if not problem.short(begun[i].placed):
+                return begun[i].placed
         tried = sorted(
-            begun[:most] or tried, key=lambda one: (problem.short(one), -one.count)
+            begun[:most] or tried,
+            key=lambda one: (problem.short(one.placed), -one.placed.count),
         )
         least = _CLOSABLE * problem.quotas.total
-        begun = [one for one in tried if problem.short(one) <= least]
-    return tried[0] if tried else None
+        begun = [one for one in tried if problem.short(one.placed) <= least]
+    return tried[0].placed if tried else None
 
 
-def closed(problem: RouteProblem, placed: CameraSet, programs: int) -> CameraSet:
-    """Move cameras over the hole until enough is measured, or too little helps."""
-    reach = _REACH * problem.limits.workspace.camera_radius_m[1]
-    lost, failed = np.zeros(0, dtype=np.int64), 0
-    for _ in range(programs if len(placed.cameras) > problem.n_fixed else 0):
+def closed(problem: RouteProblem, begun: Closing, programs: int) -> Closing:
+    """Move cameras over the hole until enough is measured, or too little helps.
+
+    Programs that failed before are counted, and not solved again.
+    """
+    placed, reach, lost, failed = begun.placed, begun.reach, begun.lost, begun.failed
+    movable = len(placed.cameras) > problem.n_fixed
+    for _ in range(programs - failed if movable else 0):
         short = problem.short(placed)
         if not short:
             break
@@ -72,7 +101,7 @@ def closed(problem: RouteProblem, placed: CameraSet, programs: int) -> CameraSet
             placed, lost = moved, lost[:0]
             if not worth:
                 break
-    return placed
+    return Closing(placed, reach, lost, failed)
 
 
 def _taken_over(
