@@ -51,24 +51,24 @@ def build_baseline_program(problem: BaselineProblem) -> BaselineProgram:
         blocks.append(_seams(names))
     kept = list(_kept(names)) if len(problem.kept.camera) else []
     first = sum(block.n_rows for block in blocks)
-    rows = StackedRows((*blocks, *kept), *_lifted(names, kept, first))
     start, x = names.start, ca.MX.sym("x", names.n)
+    rows = StackedRows(x, (*blocks, *kept), *_lifted(names, kept, first))
     bounds = [block.bounds(start) for block in rows.blocks]
-    constraints, none = rows.values(x), ca.MX.sym("p", 0)
-    both = constraints, rows.jacobian(x)
+    constraints, none = rows.values(), ca.MX.sym("p", 0)
+    both = constraints, rows.jacobian()
     jacobian = ca.Function("jac_g", [x, none], both, ["x", "p"], ["g", "jac_g_x"])
     return BaselineProgram(
         x,
         _objective(names, x),
         constraints,
-        {"jac_g": jacobian, "hess_lag": _hessian(names, rows, x)},
+        {"jac_g": jacobian, "hess_lag": _hessian(names, rows)},
         np.concatenate([low for low, _ in bounds]),
         np.concatenate([high for _, high in bounds]),
         start,
     )
 
 
-def _hessian(names: Variables, rows: StackedRows, x: ca.MX) -> ca.Function:
+def _hessian(names: Variables, rows: StackedRows) -> ca.Function:
     """Return the Hessian of sigma f + lambda.g, its upper triangle."""
     weights, scale = ca.MX.sym("lambda", rows.constant.size), ca.MX.sym("sigma")
     lambdas, near, moving = weights, np.zeros(0), np.zeros(0, dtype=np.int64)
@@ -80,8 +80,8 @@ def _hessian(names: Variables, rows: StackedRows, x: ca.MX) -> ca.Function:
         lambdas = ca.vertcat(weights[:n] - scale * _MEAN_WEIGHT / n, weights[n:])
     return ca.Function(
         "hess_lag",
-        [x, ca.MX.sym("p", 0), scale, weights],
-        [rows.hessian(x, lambdas, 2.0 * scale * ca.DM(near), moving)],
+        [rows.x, ca.MX.sym("p", 0), scale, weights],
+        [rows.hessian(lambdas, 2.0 * scale * ca.DM(near), moving)],
         ["x", "p", "lam_f", "lam_g"],
         ["triu_hess_gamma_x_x"],
     )

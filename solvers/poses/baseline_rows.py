@@ -7,7 +7,7 @@ scatters: to differentiate the whole takes longer than to solve it.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import cast
 
 import casadi as ca
@@ -104,50 +104,63 @@ class StackedRows:
     """All rows of a program over x, and terms that are linear: g(x) + L x + c.
 
     Attributes:
+        x: The variables, (n_x, 1).
         blocks: The rows, in their order.
         linear: L, shape (n_rows, n_x).
         constant: c, shape (n_rows,).
     """
 
+    x: ca.MX
     blocks: tuple[Rows, ...]
     linear: sparse.csc_array
     constant: _Array
 
-    def values(self, x: ca.MX) -> ca.MX:
-        """Return g(x) + L x + c."""
-        parts = [
-            block.kind.values(len(block.variables), *_given(block, x))
+    @cached_property
+    def _given(self) -> list[tuple[Rows, tuple[ca.MX, ca.DM]]]:
+        """The blocks with their v and q, `in_slots`."""
+        return [
+            (block, (self.x[_slots(block.variables)], ca.DM(in_slots(block.data))))
             for block in self.blocks
         ]
-        return ca.vertcat(*parts) + _constant(self.linear) @ x + ca.DM(self.constant)
 
-    def jacobian(self, x: ca.MX) -> ca.MX:
+    @cached_property
+    def _slope(self) -> ca.DM:
+        return _constant(self.linear)
+
+    def values(self) -> ca.MX:
+        """Return g(x) + L x + c."""
+        parts = [
+            block.kind.values(len(block.variables), *given)
+            for block, given in self._given
+        ]
+        return ca.vertcat(*parts) + self._slope @ self.x + ca.DM(self.constant)
+
+    def jacobian(self) -> ca.MX:
         """Return its Jacobian."""
         rows, columns, parts, first = [], [], [], 0
-        for block in self.blocks:
+        for block, given in self._given:
             m, r, n = *_shape(block), block.variables.shape[1]
-            parts.append(block.kind.slopes(m, *_given(block, x)))
+            parts.append(block.kind.slopes(m, *given))
             # Instance by instance, and of each column by column.
             row = first + np.arange(m * r).reshape(m, 1, r)
             rows.append(np.broadcast_to(row, (m, n, r)).ravel())
             columns.append(np.repeat(block.variables.ravel(), r))
             first += block.n_rows
-        shape = first, x.numel()
+        shape = first, self.x.numel()
         at = np.concatenate(rows).tolist(), np.concatenate(columns).tolist()
         pattern, order = ca.Sparsity.triplet(*shape, *at, False)
-        return ca.MX(pattern, ca.vertcat(*parts)[order]) + _constant(self.linear)
+        return ca.MX(pattern, ca.vertcat(*parts)[order]) + self._slope
 
-    def hessian(self, x: ca.MX, weights: ca.MX, own: ca.MX, of_own: _Index) -> ca.MX:
+    def hessian(self, weights: ca.MX, own: ca.MX, of_own: _Index) -> ca.MX:
         """Return the upper triangle of the Hessian of weights.(g + L x + c).
 
         To it comes the diagonal `own` at the variables `of_own`.
         """
         rows, columns, parts, first = [of_own], [of_own], [own], 0
-        for block in self.blocks:
+        for block, given in self._given:
             m, r = _shape(block)
-            own_rows = in_slots(first + np.arange(m * r).reshape(m, r))
-            lambdas = weights[own_rows.tolist()]
-            parts.append(block.kind.bends(m, *_given(block, x), lambdas))
+            lambdas = weights[_slots(first + np.arange(m * r).reshape(m, r))]
+            parts.append(block.kind.bends(m, *given, lambdas))
             # Symmetric: which of both comes first doesn't matter.
             n = block.variables.shape[1]
             rows.append(np.repeat(block.variables, n, axis=1).ravel())
@@ -155,7 +168,7 @@ class StackedRows:
             first += m * r
         row, column = np.concatenate(rows), np.concatenate(columns)
         upper = np.flatnonzero(row <= column)
-        n_x = x.numel()
+        n_x = self.x.numel()
         places, entry = np.unique(column[upper] * n_x + row[upper], return_inverse=True)
         gather = sparse.csc_array(
             (np.ones(len(upper)), (entry, upper)), shape=(len(places), len(row))
@@ -169,8 +182,8 @@ def _shape(block: Rows) -> tuple[int, int]:
     return len(block.variables), block.kind.n_values
 
 
-def _given(block: Rows, x: ca.MX) -> tuple[ca.MX, ca.DM]:
-    return x[in_slots(block.variables).tolist()], ca.DM(in_slots(block.data))
+def _slots(rows: _Index) -> list[int]:
+    return in_slots(rows).tolist()
 
 
 def _constant(matrix: sparse.csc_array) -> ca.DM:
