@@ -131,6 +131,29 @@ def side(half_height):
     return Body(RADIUS * normals + z[:, None] * UP, normals)
 
 
+def test_programs_that_failed_are_counted_and_not_solved_again(monkeypatch):
+    body = band(np.radians(2.0), n=61)
+    pair = (at(-1.1 * ETA), at(1.1 * ETA))
+    begun = hole_closing.Closing.of(
+        body.problem(offered=ring(7)), CameraSet(pair, body.measure(pair))
+    )
+    seen = []
+
+    def fails(problem, placed, lost, reach):
+        seen.append((len(lost), reach))
+        return placed, np.arange(len(lost) + 1)
+
+    monkeypatch.setattr(hole_closing, "_taken_over", fails)
+    problem = body.problem(offered=ring(7))
+    once = hole_closing.closed(problem, begun, 1)
+    again = hole_closing.closed(problem, once, 3)
+    in_turn = seen.copy()
+    seen.clear()
+    hole_closing.closed(problem, begun, 3)
+    assert in_turn == seen
+    assert (again.failed, len(seen)) == (3, 3)
+
+
 def test_a_hole_is_where_a_part_ends_and_10_is_violated_until_it_is_closed():
     """Two cameras 2.2 eta apart; each is to go on from where the other's part ends."""
     body = band(np.radians(2.0), n=301, span=np.radians(60.0))
