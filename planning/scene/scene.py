@@ -85,6 +85,11 @@ class Scene:
         return content(self.region, self.steep)
 
     @cached_property
+    def in_run(self) -> Cache:
+        """The cache, or one that ends with the scene: for what every draft asks."""
+        return self.cache if self.cache.entries is not None else Cache.in_memory()
+
+    @cached_property
     def bodies(self) -> tuple[Blocker, ...]:
         """All that stands in the way of light and views, but the object."""
         return self.obstructions + existing_bodies(self.requirements) + self.placed

@@ -181,7 +181,7 @@ def _inside(scene: Scene, target: Target) -> NDArray[np.bool_]:
     if not len(target):
         return np.zeros(0, dtype=bool)
     samples = target.samples
-    return scene.cache.recall(
+    return scene.in_run.recall(
         "lies_inside",
         (scene.mesh, samples.faces, samples.points),
         lambda: lies_inside(scene.visibility.caster, samples.faces, samples.points),

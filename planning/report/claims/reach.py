@@ -24,7 +24,7 @@ def furthest_lit(
 ) -> NDArray[np.int8]:
     """Return how far samples come over all projectors: index in `CAUSES`, or `LIT`."""
     limits = scene.requirements.projector
-    return scene.cache.recall(
+    return scene.in_run.recall(
         "furthest_lit",
         (scene.mesh, scene.bodies, limits, projectors, target),
         lambda: _furthest_lit(scene, projectors, target),
