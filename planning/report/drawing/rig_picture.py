@@ -108,14 +108,13 @@ def _devices_panel(
     if not from_above:
         direction = best_direction(_positions(figures), centre, up)
         heading = "All devices, to scale; x, y, z are the axes of the mesh file"
-    vertices = shader.caster.mesh.corners.reshape(-1, 3)
     zones, solids = zone_figures(plan), obstacle_figures(plan, zone_reach(plan))
     bodies = [line for figure in figures for line in figure.body]
     near = [shown.near for shown in (*zones, *solids)]
-    everything = np.concatenate([vertices, *bodies, *near])
+    everything = np.concatenate([shader.points, *bodies, *near])
     view = fitted(everything, direction, up, size, margin_px=0.085 * min(size))
     panel = Panel(shader.shade(view), view, shader.caster)
-    panel.keep_clear(vertices)
+    panel.keep_clear(shader.points)
     draw_zones(panel, zones)
     draw_obstacles(panel, solids, direction)
     panel.heading(heading)
@@ -188,8 +187,8 @@ def _close_up(
         spots.append(region_spots(plan, shader.caster, back))
     part = (size[0] // len(directions), size[1] - foot)
     for k, direction in enumerate(directions):
-        corners = mesh.corners.reshape(-1, 3)
-        view = fitted(corners, direction, up, part, margin_px=0.11 * min(part))
+        margin = 0.11 * min(part)
+        view = fitted(shader.points, direction, up, part, margin_px=margin)
         panel = Panel(shader.shade(view), view)
         panel.axes(size=12.0)
         panel.scale_bar(size=13.0)

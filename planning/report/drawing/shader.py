@@ -1,5 +1,6 @@
 """Pictures of a mesh without OpenGL: parallel rays, smooth shading, flat colours."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -7,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from geometry.arrays import rows_of
+from geometry.arrays import cross, rows_of
 from geometry.mesh.tensors import summed, unit
 from geometry.rays.rays import CHUNK, RayCaster, equal_parts
 
@@ -34,17 +35,27 @@ class Shader:
         mesh, (width, height) = self.caster.mesh, view.size
         picture = np.empty((height, width, 3), dtype=np.uint8)
         picture[:] = BACKGROUND
-        pixels = view.project(mesh.corners.reshape(-1, 3))
+        pixels = view.project(self.points)
         low = np.clip(np.floor(pixels.min(axis=0)), 0, view.size).astype(int)
         high = np.clip(np.ceil(pixels.max(axis=0)) + 1, 0, view.size).astype(int)
         columns, rows = np.meshgrid(*map(np.arange, low, high))
         columns, rows = columns.ravel(), rows.ravel()
-        # In parts, so that what is between stays in the cache.
-        for part in equal_parts(len(columns), CHUNK):
+        # Known before threads ask for them.
+        _ = self._slopes, self._corner_normals
+
+        def draw(part: slice) -> None:
             across, down = columns[part], rows[part]
             colours, hit = self._rays(view, across, down)
             picture[down[hit], across[hit]] = colours
+
+        # In parts, so that what is between stays in the cache.
+        self.caster.share(draw, equal_parts(len(columns), CHUNK))
         return Image.fromarray(picture)
+
+    @cached_property
+    def points(self) -> NDArray[np.float64]:
+        """What the mesh reaches to in any view: its vertices [m], (n, 3)."""
+        return rows_of(self.caster.mesh.vertices, self.caster.mesh.used)
 
     def _rays(
         self, view: PictureView, columns: NDArray[np.int64], rows: NDArray[np.int64]
@@ -86,10 +97,16 @@ class Shader:
     def _slopes(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Gradients of the barycentric coordinates of b and c, (n_f, 3) each."""
         mesh = self.caster.mesh
-        a, b, c = mesh.corners[:, 0], mesh.corners[:, 1], mesh.corners[:, 2]
-        double = np.maximum(2.0 * mesh.face_areas, 1e-30)[:, None]
-        normals = mesh.face_normals / double
-        return np.cross(normals, a - c), np.cross(normals, b - a)
+        of_b, of_c = np.empty((2, len(mesh.faces), 3))
+
+        def slope(part: slice) -> None:
+            a, b, c = mesh.corners[part].transpose(1, 0, 2)
+            double = np.maximum(2.0 * mesh.face_areas[part], 1e-30)[:, None]
+            normals = mesh.face_normals[part] / double
+            of_b[part], of_c[part] = cross(normals, a - c), cross(normals, b - a)
+
+        self._share(slope)
+        return of_b, of_c
 
     @cached_property
     def _corner_normals(self) -> NDArray[np.float64]:
@@ -98,16 +115,31 @@ class Shader:
         Weighted by angle, so that how a face is cut doesn't count.
         """
         mesh = self.caster.mesh
-        edges = np.roll(mesh.corners, -1, axis=1) - mesh.corners
-        to_next = unit(edges.reshape(-1, 3)).reshape(edges.shape)
-        cosine = -np.einsum("nkj,nkj->nk", to_next, np.roll(to_next, 1, axis=1))
-        angles = np.arccos(np.clip(cosine, -1.0, 1.0))
-        weighted = angles[:, :, None] * mesh.face_normals[:, None]
-        flat = mesh.face_normals[:, None]
-        total = summed(weighted.reshape(-1, 3), mesh.faces.ravel(), len(mesh.vertices))
-        mean = unit(total)[mesh.faces]
-        crease = np.sum(mean * flat, axis=2) < _CREASE
-        return np.where(crease[:, :, None], flat, mean)
+        normals = np.empty((len(mesh.faces), 3, 3))
+
+        def weigh(part: slice) -> None:
+            corners = mesh.corners[part]
+            edges = np.roll(corners, -1, axis=1) - corners
+            to_next = unit(edges.reshape(-1, 3)).reshape(edges.shape)
+            cosine = -np.einsum("nkj,nkj->nk", to_next, np.roll(to_next, 1, axis=1))
+            angles = np.arccos(np.clip(cosine, -1.0, 1.0))
+            normals[part] = angles[:, :, None] * mesh.face_normals[part, None]
+
+        self._share(weigh)
+        total = summed(normals.reshape(-1, 3), mesh.faces.ravel(), len(mesh.vertices))
+        smooth = unit(total)
+
+        def choose(part: slice) -> None:
+            flat, mean = mesh.face_normals[part, None], smooth[mesh.faces[part]]
+            crease = np.sum(mean * flat, axis=2) < _CREASE
+            normals[part] = np.where(crease[:, :, None], flat, mean)
+
+        self._share(choose)
+        return normals
+
+    def _share(self, work: Callable[[slice], None]) -> None:
+        """Do work on every part of the faces, in parts that stay in the cache."""
+        self.caster.share(work, equal_parts(len(self.caster.mesh.faces), CHUNK))
 
 
 def _brightness(normals: NDArray[np.float64], view: PictureView) -> NDArray[np.float64]:
