@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
+from geometry.parallel import abandonable
 from planning.cameras.baselines.baseline_rows import baseline_rows
 from planning.cameras.baselines.seams import SampledSurface
 from planning.model.document.certificates import Certificates
@@ -130,12 +131,18 @@ class Draft:
             if not partial.request.evaluates:
                 regions = with_small_floor(regions, partial.stage.candidates)
             certificates = with_fewer_needed(certificates, partial, clock)
-        with clock.stage("proofs", "certificates of the bounds over the candidates"):
+        surface = surface_of(scene, devices, partial.ready)
+        with (
+            clock.stage("proofs", "certificates of the bounds over the candidates"),
+            abandonable(1) as pool,
+        ):
+            # Deflating it leaves the interpreter to the proofs.
+            packed = pool.submit(lambda: surface.sha256)
             certificates, proof = with_proofs(partial, certificates)
+            packed.result()
         stationed = partial.stationed
         moved = stationed is not None and stationed.record.kind != "heads"
         overlaps, schedule = overlap_records(among, devices.projectors, moved=moved)
-        surface = surface_of(scene, devices, partial.ready)
         requirements = _final_requirements(among, claims, devices)
         told = Told(
             requirements,

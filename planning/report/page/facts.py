@@ -161,7 +161,9 @@ def _obstacles(plan: RigPlan, payload: Payload) -> list[dict[str, Any]]:
 def _half_floats(values: Array) -> Any:  # noqa: ANN401
     """Return values as 16 bit floats in two bytes; NaN, which is nothing, as 0."""
     with np.errstate(over="ignore"):
-        return np.nan_to_num(values, nan=0.0).astype("<f2").view(np.uint16)
+        halves = values.astype("<f2")
+    halves[np.isnan(halves)] = 0.0
+    return halves.view(np.uint16)
 
 
 def _directions(steep: Array) -> Any:  # noqa: ANN401

@@ -10,6 +10,7 @@ from string import Template
 import numpy as np
 
 from geometry.arrays import Array, Ints
+from geometry.parallel import mapped
 from planning.model.files import write_atomically
 from planning.model.plan import RigPlan
 from planning.report.summary.shortfall import shortfalls
@@ -97,6 +98,10 @@ def page_of(
     samples = centroids(plan)
     facts = per_face(plan, samples, threads=threads)
     told, payload = viewer_facts(plan, samples, facts, error_m)
+    # Deflating leaves the interpreter to the drawing.
+    packed, wall = mapped(
+        lambda made: made(), (payload.text, lambda: wall_sheet(plan)), threads
+    )
     style, script = _resource("page.css"), _resource("viewer.js")
     mesh = plan.document.own_mesh.path
     title = f"Rig plan for {PurePath(mesh).name if mesh else 'a surface'}"
@@ -115,10 +120,10 @@ def page_of(
         remark=escape(_NO_CLOUD) if error_m is None else "",
         tables="".join((members, *device_tables(plan), *claim_tables(plan))),
         summary=escape(summary(plan, (), shortfalls(plan))),
-        wall=wall_sheet(plan),
+        wall=wall,
         footer=escape(footer),
         facts=as_script(told),
-        payload=payload.text(),
+        payload=packed,
         script=script,
     )
 
