@@ -1,3 +1,4 @@
+import igl
 import numpy as np
 import pytest
 from support.plain_shapes import box, grid
@@ -104,3 +105,21 @@ def test_no_points_give_no_answers() -> None:
 def test_bad_queries_are_refused(points: np.ndarray, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         closest_points(grid(1.0, 1.0, divisions=(1, 1)), points)
+
+
+def test_distances_are_those_of_libigl_to_the_last_digit_on_a_crumpled_body() -> None:
+    rng, ball = np.random.default_rng(3), sphere(0.1, subdivisions=3)
+    vertices = ball.vertices * rng.uniform(0.6, 1.4, (len(ball.vertices), 1))
+    mesh = TriangleMesh(vertices, ball.faces)
+    points = np.concatenate([vertices, 0.5 * vertices, 1.5 * vertices])
+    points = points + rng.normal(0.0, 0.01, points.shape)
+    found = closest_points(mesh, points)
+    distances, faces, feet, _ = igl.signed_distance(
+        points - mesh.centre,
+        mesh.vertices - mesh.centre,
+        mesh.faces,
+        sign_type=igl.SIGNED_DISTANCE_TYPE_PSEUDONORMAL,
+    )
+    np.testing.assert_array_equal(found.distances, distances)
+    np.testing.assert_array_equal(found.faces, faces)
+    np.testing.assert_array_equal(found.points, feet + mesh.centre)
