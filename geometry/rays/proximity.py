@@ -79,7 +79,7 @@ def _tree_of(mesh: TriangleMesh) -> tuple[igl.AABB, Array]:
 def _pseudonormals(
     mesh: TriangleMesh, vertices: Array, feet: Array, faces: Ints
 ) -> Array:
-    """Normals by which feet on faces tell outside from inside, of any length, (n, 3)."""
+    """Normals by which feet on faces tell outside from inside, any length, (n, 3)."""
     normals, places = mesh.face_normals[faces], mesh.faces[faces]
     corners = vertices[places]
     at_corner = lengths(feet[:, None] - corners) < _THERE

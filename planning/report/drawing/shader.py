@@ -32,7 +32,7 @@ class Shader:
 
     def shade(self, view: PictureView) -> Image.Image:
         """Return the mesh as seen in a view, on the background colour."""
-        mesh, (width, height) = self.caster.mesh, view.size
+        width, height = view.size
         picture = np.empty((height, width, 3), dtype=np.uint8)
         picture[:] = BACKGROUND
         pixels = view.project(self.points)

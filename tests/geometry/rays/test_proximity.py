@@ -122,4 +122,4 @@ def test_distances_are_those_of_libigl_to_the_last_digit_on_a_crumpled_body() ->
     )
     np.testing.assert_array_equal(found.distances, distances)
     np.testing.assert_array_equal(found.faces, faces)
-    np.testing.assert_array_equal(found.points, feet + mesh.centre)
+    np.testing.assert_array_equal(found.points, np.add(feet, mesh.centre))
