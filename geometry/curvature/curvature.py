@@ -61,6 +61,7 @@ class CurvatureField:
 
 # By the mesh itself: a plan and its report ask for the same.
 _KNOWN: WeakKeyDictionary[TriangleMesh, CurvatureField] = WeakKeyDictionary()
+_FACETS: WeakKeyDictionary[TriangleMesh, float] = WeakKeyDictionary()
 
 
 def principal_curvatures(
@@ -108,6 +109,12 @@ def facet_size(mesh: TriangleMesh) -> float:
     that turn by less than 40 degrees; sharper ones are creases of the object, and flat
     surface counts nothing, however large its triangles. 0 without such an edge.
     """
+    if mesh not in _FACETS:
+        _FACETS[mesh] = _facet_size(mesh)
+    return _FACETS[mesh]
+
+
+def _facet_size(mesh: TriangleMesh) -> float:
     edges = mesh.edges
     pairs, edge = face_pairs(edges)
     normals = mesh.face_normals[pairs]

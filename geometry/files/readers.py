@@ -107,7 +107,10 @@ def usable_mesh(
         repairs=(*cleaned, *far, *turned, *stray),
     )
     origin = raw.origin or FileOrigin.of_itself(raw.faces, len(raw.vertices))
-    return TriangleMesh(mesh.vertices, faces, source, origin.of_faces(kept[near]))
+    origin = origin.of_faces(kept[near])
+    if np.array_equal(faces, mesh.faces):
+        return mesh.told_of(source, origin)
+    return TriangleMesh(mesh.vertices, faces, source, origin)
 
 
 def _without_far(mesh: TriangleMesh) -> tuple[TriangleMesh, Ints, tuple[Repair, ...]]:

@@ -1,6 +1,7 @@
 """A triangle mesh in metres, and where it came from."""
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeVar
@@ -116,6 +117,13 @@ class TriangleMesh:
             np.concatenate([mesh.main for mesh in meshes])
         )
         return together
+
+    def told_of(self, source: MeshSource, origin: FileOrigin) -> "TriangleMesh":
+        """Return the same mesh, with all that is known of it, as it came from a file."""
+        told = copy(self)
+        object.__setattr__(told, "source", source)
+        object.__setattr__(told, "origin", origin)
+        return told
 
     @cached_property
     def corners(self) -> Array:

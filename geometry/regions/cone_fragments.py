@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from geometry.arrays import Array, Ints, Mask
+from geometry.arrays import Array, Ints, Mask, rows_of
 from geometry.mesh.tensors import unit
 
 from .cone_sums import CONE_SHARE, Patch
@@ -68,8 +68,8 @@ def _best(patch: Patch, fragment: Ints, piece: Ints, axis: Array) -> Ints:
     owner = np.full(len(sums), -1, dtype=np.int64)
     a, b = patch.links.T
     free, taken = fragment >= 0, piece >= 0
-    forth = patch.links[free[a] & taken[b]]
-    back = patch.links[free[b] & taken[a]][:, ::-1]
+    forth = rows_of(patch.links, free[a] & taken[b])
+    back = rows_of(patch.links, free[b] & taken[a])[:, ::-1]
     both = np.concatenate([forth, back])
     key = np.unique(fragment[both[:, 0]] * len(axis) + piece[both[:, 1]])
     met = np.stack(np.divmod(key, len(axis)), axis=1)

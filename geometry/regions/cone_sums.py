@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from geometry.arrays import Array, Ints
+from geometry.arrays import Array, Ints, rows_of
 from geometry.mesh.tensors import summed, unit
 from geometry.mesh.topology import components, grouped
 
@@ -45,17 +45,19 @@ class Patch:
 
     @cached_property
     def _weighted(self) -> Array:
-        return np.column_stack([self.normals * self.areas[:, None], self.areas])
+        columns = np.column_stack([self.normals * self.areas[:, None], self.areas])
+        # They are summed column by column.
+        return np.asfortranarray(columns)
 
     def connected(self, part: Ints) -> Ints:
         """Number the connected faces of parts; -1 stays."""
         a, b = part[self.links].T
-        label = components(self.links[(a == b) & (a >= 0)], self.n)[1]
+        label = components(rows_of(self.links, (a == b) & (a >= 0)), self.n)[1]
         return renumbered(np.where(part < 0, -1, label))
 
     def cosines(self, piece: Ints, axis: Array) -> Array:
         """Return each face's normal times the axis (k, 3) of its piece, or 0, (n,)."""
-        axes = np.append(axis, np.zeros((1, 3)), axis=0)[piece]
+        axes = rows_of(np.append(axis, np.zeros((1, 3)), axis=0), piece)
         return np.einsum("ij,ij->i", self.normals, axes)
 
     def shares(self, piece: Ints) -> Array:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from geometry.arrays import Array, Ints, Mask
+from geometry.arrays import Array, Ints, Mask, rows_of
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.topology import grouped
 from geometry.poses import fibonacci_cap
@@ -58,9 +58,10 @@ def _in_some_box(mesh: TriangleMesh, patch: Ints, holding: Mask, asked: Mask) ->
     """Whether the box of each asked patch lies in that of another that may hold it."""
     order = np.argsort(patch, kind="stable")
     start = np.searchsorted(patch[order], np.arange(len(holding)))
-    low, high = mesh.corners.min(axis=1), mesh.corners.max(axis=1)
-    low = np.minimum.reduceat(low[order], start)
-    high = np.maximum.reduceat(high[order], start)
+    a, b, c = mesh.corners.transpose(1, 0, 2)
+    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    low = np.minimum.reduceat(rows_of(low, order), start)
+    high = np.maximum.reduceat(rows_of(high, order), start)
     outer, rows = np.flatnonzero(holding), np.flatnonzero(asked)
     inside = np.zeros(len(holding), dtype=bool)
     if not len(outer):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from geometry.arrays import Array, Ints, Mask
+from geometry.arrays import Array, Ints, Mask, lengths
 from geometry.mesh.mesh import MeshError, Repair
 from geometry.mesh.tensors import area_normals
 from geometry.mesh.topology import numbered
@@ -93,7 +93,7 @@ def _equal_rows(rows: Array | Ints) -> tuple[Ints, Ints]:
 
 def _drop_flat(vertices: Array, faces: Ints) -> _Step:
     corners = vertices[faces]
-    double_area = np.linalg.norm(area_normals(corners), axis=1)
+    double_area = lengths(area_normals(corners))
     sides = corners - np.roll(corners, 1, axis=1)
     longest = np.einsum("ikj,ikj->ik", sides, sides).max(axis=1)
     keep = double_area > _FLAT * longest
