@@ -119,7 +119,7 @@ class TriangleMesh:
         return together
 
     def told_of(self, source: MeshSource, origin: FileOrigin) -> "TriangleMesh":
-        """Return the same mesh, with all that is known of it, as it came from a file."""
+        """Return the mesh, with all that is known of it, as it came from a file."""
         told = copy(self)
         object.__setattr__(told, "source", source)
         object.__setattr__(told, "origin", origin)
