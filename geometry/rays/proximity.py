@@ -83,7 +83,7 @@ def _pseudonormals(
     normals, places = mesh.face_normals[faces], mesh.faces[faces]
     corners = vertices[places]
     at_corner = lengths(feet[:, None] - corners) < _THERE
-    found = at_corner.any(axis=1)
+    found = np.array(at_corner.any(axis=1))
     rows = np.flatnonzero(found)
     at = places[rows, np.argmax(at_corner[rows], axis=1)]
     normals[rows] = _corner_normals(mesh, vertices, at)

@@ -5,40 +5,46 @@ from collections.abc import Iterator
 import numpy as np
 from PIL import Image, ImageDraw
 
-from geometry.arrays import Array, Mask
+from geometry.arrays import Array, Ints, Mask, rows_of
 
 # Side of a cell, in the units that are drawn: far less than a line is wide.
 _CELL = 0.2
 
 
-def outlines(triangles: Array) -> list[Array]:
+def outlines(points: Array, faces: Ints, sides: Ints) -> list[Array]:
     """Return the closed curves about all that triangles cover, each (k, 2).
 
     Cells that triangles touch, their border through the middles of its cells' sides.
     Of points on a line the middle ones are left out.
 
     Args:
-        triangles: Corners on the sheet, shape (n, 3, 2).
+        points: Corners on the sheet, shape (n, 2).
+        faces: Those of each triangle, which each are of one or more, shape (n_f, 3).
+        sides: Both ends of each side of them, shape (n_s, 2).
     """
-    low = triangles.min(axis=(0, 1)) - 2.0 * _CELL
-    return [low + _CELL * curve for curve in _borders(_covered(triangles - low))]
+    low = points.min(axis=0) - 2.0 * _CELL
+    covered = _covered((points - low) / _CELL, faces, sides)
+    return [low + _CELL * curve for curve in _borders(covered)]
 
 
-def _covered(triangles: Array) -> Mask:
+def _covered(places: Array, faces: Ints, sides: Ints) -> Mask:
     """Cells (rows, columns) that triangles touch, with empty ones about them."""
-    places = triangles / _CELL
-    columns, rows = np.ceil(places.max(axis=(0, 1))).astype(int) + 3
+    columns, rows = np.ceil(places.max(axis=0)).astype(int) + 3
     picture = Image.new("1", (columns, rows))
     draw = ImageDraw.Draw(picture)
     # A pixel's middle is at whole numbers there.
-    a, b, c = places.transpose(1, 2, 0)
-    wide = np.maximum(np.maximum(a, b), c) - np.minimum(np.minimum(a, b), c)
-    for corners in places[np.maximum(*wide) > 2.0].reshape(-1, 6) - 0.5:
+    wide = np.zeros(len(faces), dtype=bool)
+    for along in np.ascontiguousarray(places.T):
+        a, b, c = (along[corner] for corner in faces.T)
+        reach = np.maximum(np.maximum(a, b), c) - np.minimum(np.minimum(a, b), c)
+        wide |= reach > 2.0
+    for corners in places[faces[wide]].reshape(-1, 6) - 0.5:
         draw.polygon(corners.tolist(), fill=1)
     cells = np.array(picture)
     # A smaller one lies in the cells of its corners and the middles of its sides.
-    for points in (places, 0.5 * (places + np.roll(places, 1, axis=1))):
-        column, row = np.floor(points.reshape(-1, 2)).astype(int).T
+    first, last = (rows_of(places, ends) for ends in sides.T)
+    for touched in (places, 0.5 * (first + last)):
+        column, row = np.floor(touched).astype(int).T
         cells[row, column] = True
     return cells
 

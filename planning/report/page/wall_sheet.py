@@ -13,6 +13,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from geometry.arrays import Array
 from geometry.mesh.mesh import TriangleMesh
+from geometry.mesh.topology import numbered
 from geometry.poses import horizontal_axes
 from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.plan import RigPlan
@@ -106,7 +107,9 @@ def _drawn(
     (x, y), parts = placed(centre[None])[0], list[str]()
     for ends in ((_MARGIN, y, _SIDE, y), (x, 0.0, x, edge)):
         parts.append(_line("axis", *ends))
-    curves = outlines(placed(mesh.vertices)[mesh.faces])
+    used, faces = numbered(mesh.faces, len(mesh.vertices))
+    sides = numbered(mesh.edges.ends, len(mesh.vertices))[1]
+    curves = outlines(placed(mesh.vertices[used]), faces, sides)
     told = " ".join(f"M{_points(curve)}Z" for curve in curves)
     parts.append(f'<path class="object" fill-rule="evenodd" d="{told}"/>')
     spots: dict[str, Array] = {}

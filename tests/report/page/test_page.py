@@ -240,7 +240,10 @@ def test_outlines_are_those_of_what_triangles_cover(pieces):
     if pieces == 16:
         outer = 300.0 + 50.0 * rim
     halves = [inner[:-1], outer[:-1], outer[1:]], [inner[:-1], outer[1:], inner[1:]]
-    curves = outlines(np.concatenate([np.stack(half, axis=1) for half in halves]))
+    triangles = np.concatenate([np.stack(half, axis=1) for half in halves])
+    faces = np.arange(3 * len(triangles)).reshape(-1, 3)
+    sides = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    curves = outlines(triangles.reshape(-1, 2), faces, sides)
     assert len(curves) == 2
     for curve, wanted in zip(sorted(curves, key=np.ptp), (inner, outer), strict=True):
         for axis in (0, 1):
