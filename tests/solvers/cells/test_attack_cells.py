@@ -98,9 +98,9 @@ def test_no_pose_leaves_the_set_of_its_cell_until_one_bit_is_cleared(
 
 def test_cells_are_the_same_by_any_number_of_threads(attack_cells, monkeypatch):
     monkeypatch.setattr("planning.proofs.cells.position_cells.PAIRS", 64)
-    found = []
+    found, box = [], SHAPES["notched box"]
     for threads in (1, 3):
-        scene, template, rows, _ = made(SHAPES["notched box"], "diverging", attack_cells)
+        scene, template, rows, _ = made(box, "diverging", attack_cells)
         scene.visibility.caster.threads = threads
         tree = attack_cells.tree_of(scene, template, rows, 3)
         names = tree.roots().cells
