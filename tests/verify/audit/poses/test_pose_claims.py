@@ -289,6 +289,6 @@ def test_shadows_count_only_where_all_devices_stand_outside(handmade, case) -> N
         workspace = document["requirements"]["workspace"]
         workspace["projector_radius_m"] = [0.04, 1.1]
 
-    assert n_stages(case) == 3
+    assert n_stages(case) == 4
     assert n_stages(case, shadows=False) == 1
     assert n_stages(replace(case, plan=handmade.tampered(case.plan, come_near))) == 1
