@@ -127,15 +127,14 @@ def bound_projectors(
         return found, tree
 
     # Shadows cost most, and what is proved without them holds with them.
-    first, plain = effort, known
+    first, bare = effort, unshadowed if shadows else None
     if shadows:
         maps, finest = max(0, effort.maps - 1), min(effort.finest, _FIRST_FINEST)
         first = replace(effort, maps=maps, finest=finest, budget=_FIRST * effort.budget)
-        plain = known if unshadowed is None else unshadowed
-    guided = shadows and unshadowed is not None and plain is not None
     found: tuple[CellBound, _Tree] | None = None
-    if not guided or question.room(plain, effort.budget) > 0.0:
-        found = searched(first, plain, shadows=False, with_floors=not guided)
+    if bare is None or question.room(bare, effort.budget) > 0.0:
+        guide, floored = (known, True) if bare is None else (bare, False)
+        found = searched(first, guide, shadows=False, with_floors=floored)
     if shadows and (found is None or found[0].status is not CellStatus.PROVED):
         among = searched(effort, known, shadows=True)
         finer = replace(
