@@ -102,11 +102,12 @@ def bound_projectors(
         *,
         shadows: bool,
         with_floors: bool = True,
+        closely: bool = False,
     ) -> tuple[CellBound, _Tree]:
         cube = cube_map(1 << effort.maps)
         required = scene.requirements.projector
         limits = DirectionLimits(required.max_incidence, required.min_tangent_angle)
-        if not parallel:
+        if not (parallel or closely):
             # Cells of positions are held against the limits themselves.
             limits = DirectionLimits(required.max_incidence, 0.0, closely=False)
         opened = open_samples(
@@ -145,7 +146,8 @@ def bound_projectors(
         )
         bits = cube_map(1 << finer.maps).size * len(samples)
         if finer.budget and bits <= 8.0 * _MAP_BYTES and _leaves_room(among[0]):
-            among = max(among, searched(finer, known, shadows=True), key=_proved)
+            again = searched(finer, known, shadows=True, closely=True)
+            among = max(among, again, key=_proved)
         # Cut short, a longer search may have proved less.
         if shadows := found is None or _proved(among) >= _proved(found):
             found = among
