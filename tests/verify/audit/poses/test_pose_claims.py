@@ -20,6 +20,7 @@ from planning.verify.audit.proofs.frozen_samples import (
 )
 from planning.verify.audit.proofs.poses.device_cells import device_cells, lit_by_plan
 from planning.verify.audit.proofs.poses.pose_claims import PoseBound, audit_pose_proofs
+from planning.verify.audit.proofs.poses.skies import SkyMaps
 from planning.verify.trust import OVER_POSES, taken_on_trust
 
 _KINDS = ("projector", "camera")
@@ -169,6 +170,36 @@ def test_forged_ones_are_never_called_proved(case, kind) -> None:
     assert not false
     assert "over all poses is claimed" in bounds[kind].line
     assert bounds[kind].trusted
+
+
+@pytest.mark.parametrize("kind", _KINDS)
+def test_where_a_single_pose_costs_too_much_no_map_is_drawn(
+    case, kind, monkeypatch
+) -> None:
+    def never(*_: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr(SkyMaps, "of", never)
+    forged = with_proof(case.plan, kind, n_devices=9)
+    bounds, false = held(case, with_bound(forged, kind, lower_bound=10))
+    assert not false
+    assert bounds[kind].line.endswith(
+        "left some open, and a pose there costs more than that"
+    )
+
+
+def test_a_pose_in_the_middle_of_a_cell_serves_no_more_than_the_cell(case) -> None:
+    some, every = np.arange(60), np.ones((1, 60), dtype=bool)
+    made = device_cells(case, "projector", case.samples.take(some), every, shadows=True)
+    cells = made.roots
+    for _ in range(6):
+        cells = cells.halves(made.object_m).take(np.arange(0, 2 * len(cells.low_m), 2))
+    inside = made.at_middles(cells, some)
+    may = np.ones(inside.shape, dtype=bool)
+    held_by = made.of(some, lambda _: None, None).serve(cells, may)
+    assert inside.any()
+    assert held_by[inside].all()
+    assert not np.array_equal(inside, held_by)
 
 
 @pytest.mark.long

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from geometry.arrays import Ints, Mask
+from geometry.arrays import Array, Ints, Mask
 from geometry.devices import ParallelModel, PinholeModel
 from planning.model.plan import RigPlan
 from planning.verify.audit.audit_case import AuditCase
@@ -37,12 +37,14 @@ class DeviceCells:
         object_m: Farthest a sample is from the centre; 0 of parallel light [m].
         make: What cells serve of some samples, with or without their skies.
         maps: What is blocked of samples, ever finer; none where nothing counts.
+        in_sight: Which of some samples nothing hides from poses, of cells of no size.
     """
 
     roots: Cells
     object_m: float
     make: _Make
     maps: tuple[SkyMaps, ...]
+    in_sight: Callable[[Ints, Cells], Mask]
 
     @property
     def stages(self) -> tuple[SkyMaps | None, ...]:
@@ -52,6 +54,15 @@ class DeviceCells:
     def counts(self, maps: SkyMaps | None) -> bool:
         """Return whether all that counts of shadows is in these maps."""
         return maps is not None or not self.maps
+
+    def at_middles(self, cells: Cells, some: Ints) -> Mask:
+        """Return which of some samples a pose in the middle of each cell may serve.
+
+        With one ray each for what is in between, which no map tells better; (k, n).
+        """
+        poses = cells.shrunk()
+        may = np.ones((len(cells.low_m), len(some)), dtype=bool)
+        return self.make(some, None).serve(poses, may) & self.in_sight(some, poses)
 
     def of(
         self, some: Ints, say: Callable[[str], None], maps: SkyMaps | None
@@ -94,9 +105,33 @@ def device_cells(
         touching_m = 2.0 * case.shadow.slack_m
         given = samples, case.shadow.caster, incidence, tangent, touching_m
         maps = tuple(SkyMaps(*given, pixels) for pixels in _PIXELS)
+    parallel = aside is not None
     return DeviceCells(
-        Cells.of_shell(*shell), 0.0 if aside is not None else object_m, make, maps
+        Cells.of_shell(*shell),
+        0.0 if parallel else object_m,
+        make,
+        maps,
+        partial(_in_sight, case, samples, None if parallel else centre),
     )
+
+
+def _in_sight(
+    case: AuditCase,
+    samples: AuditSamples,
+    centre: Array | None,
+    some: Ints,
+    poses: Cells,
+) -> Mask:
+    taken, seen = samples.take(some), []
+    for direction, radius in zip(poses.middle, poses.low_m, strict=True):
+        way = np.broadcast_to(direction, taken.points.shape)
+        away = np.full(len(some), np.inf)
+        if centre is not None:
+            way = centre + radius * direction - taken.points
+            away = np.linalg.norm(way, axis=1)
+            way = way / away[:, None]
+        seen.append(case.shadow.free(taken.points, taken.faces, -way, away))
+    return np.array(seen)
 
 
 def _outside(

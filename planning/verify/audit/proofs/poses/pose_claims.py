@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.arrays import Ints
+from geometry.arrays import Ints, Mask
 from planning.model.document.certificates import ContinuousProof
 from planning.model.proofs import PoseProof
 from planning.verify.audit.audit_case import AuditCase, DeviceKind
@@ -192,7 +192,19 @@ class _Search:
                 outcome = self._question(self.wanted, maps).by_pairs(least)
             if outcome.too_few:
                 break
+            # Pairs may yet do what multipliers can't.
+            if n_devices != 2 and self._in_vain(outcome, paying, most):
+                how = f"{outcome.how}, and a pose there costs more than that"
+                return Outcome(False, how)
         return outcome
+
+    def _in_vain(self, outcome: Outcome, paying: Mask, most: int) -> bool:
+        """Return whether single poses cost too much, so that no map is fine enough."""
+        if outcome.left is None:
+            return False
+        served = self.cells.at_middles(outcome.left, self.wanted[paying])
+        multipliers = self.multipliers[self.wanted][paying]
+        return bool(np.any(served @ multipliers > most))
 
     def _question(self, some: Ints, maps: SkyMaps | None) -> Question:
         made = self.cells.of(some, self.say, maps)

@@ -49,6 +49,13 @@ class Cells(NamedTuple):
         polar, turn = self.polar + self.polar_end, self.turn + self.turn_end
         return _direction(0.5 * polar, 0.5 * turn)
 
+    def shrunk(self) -> "Cells":
+        """Return the pose in the middle of each, as a cell of no size."""
+        low_m, high_m, polar, polar_end, turn, turn_end = self
+        radius, polar = 0.5 * (low_m + high_m), 0.5 * (polar + polar_end)
+        turn = 0.5 * (turn + turn_end)
+        return Cells(radius, radius, polar, polar, turn, turn)
+
     @property
     def angle(self) -> Array:
         """Angle a about it that holds all directions [rad], (n,): a corner's.

@@ -27,6 +27,8 @@ _BATCH, _FINEST = 64, 2e-3
 # Cells that are looked at in all, and of which all pairs are.
 _MOST, _MOST_PAIRED = 400_000, 6_000
 _ROWS = 512
+# Cells left open that are told of.
+_LEFT = 8
 
 
 class OptimisticCells(Protocol):
@@ -37,12 +39,19 @@ class OptimisticCells(Protocol):
         ...
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Outcome:
-    """Whether so many devices were shown to be too few, and by how many cells."""
+    """Whether so many devices were shown to be too few.
+
+    Attributes:
+        too_few: Whether they were.
+        how: By how many cells, or why not.
+        left: Cells that multipliers left open, as small as they get; None: none.
+    """
 
     too_few: bool
     how: str
+    left: Cells | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,8 +84,9 @@ class Question:
             # The costliest of the last ones first: what can't be closed shows soon.
             part, waiting = waiting.cut(_BATCH)
             widths = part.cells.widths(self.object_m).max(axis=1)
-            if np.any(widths < _FINEST):
-                return Outcome(False, f"{looked_at} cells left some open")
+            if np.any(narrow := widths < _FINEST):
+                left = part.cells.take(np.flatnonzero(narrow)[-_LEFT:])
+                return Outcome(False, f"{looked_at} cells left some open", left)
             halves = part.cells.halves(self.object_m)
             may = np.repeat(part.served, 2, axis=0)
             waiting = waiting.with_more(self._costly(halves, may, multipliers, most))
