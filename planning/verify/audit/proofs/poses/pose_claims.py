@@ -28,6 +28,9 @@ from .too_few import Outcome, Question, most_of_one
 # Share of the samples by which lit ones may differ from those that were planned.
 _LIT = 0.01
 _EVERY_S = 5.0
+# Attempts where pairs of cells are looked at, too: with the finest maps it would be
+# minutes.
+_PAIRED = 3
 
 
 @dataclass(frozen=True)
@@ -185,15 +188,16 @@ class _Search:
         # What costs nothing closes no cell.
         paying = multipliers > 0
         outcome = Outcome(False, "")
-        for maps in self.cells.stages:
+        pairs = n_devices == 2
+        for maps in self.cells.stages[: _PAIRED if pairs else None]:
             asked = self._question(self.wanted[paying], maps)
             outcome = asked.by_multipliers(most, multipliers[paying])
-            if n_devices == 2 and not outcome.too_few and self.cells.counts(maps):
+            if pairs and not outcome.too_few and self.cells.counts(maps):
                 outcome = self._question(self.wanted, maps).by_pairs(least)
             if outcome.too_few:
                 break
             # Pairs may yet do what multipliers can't.
-            if n_devices != 2 and self._in_vain(outcome, paying, most):
+            if not pairs and self._in_vain(outcome, paying, most):
                 how = f"{outcome.how}, and a pose there costs more than that"
                 return Outcome(False, how)
         return outcome
