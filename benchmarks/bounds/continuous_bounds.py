@@ -9,9 +9,9 @@ For the sample and the twelve meshes in `../shared/data/meshes` (those named, if
 `count / bound over candidates / bound over all poses` for each light, required share
 and tangent limit, on the 2,000 samples that the planner starts from; what the search
 over cells proved it by, and the seconds of maps and searches together, of the clock and
-of all processors. With
-`--more N` the count that N times as many candidates need stands beside it, and no bound
-over all poses. `*`: shadows were left out. A bound in bold equals the count.
+of all processors. With `--more N` the count that N times as many candidates need stands
+beside it, and no bound over all poses. `*`: shadows were left out. A bound in bold
+equals the count.
 """
 
 import argparse

@@ -7,12 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.document.certificates import Certificate, ContinuousProof
-from solvers.cells.cell_bound import (
-    MOST_CELLS,
-    CellBound,
-    CellStatus,
-    bound_count,
-)
+from solvers.cells.cell_bound import MOST_CELLS, CellBound, CellStatus, bound_count
 from solvers.cells.cell_problem import CellProblem
 from solvers.cells.cell_tree import CellTree
 from solvers.cells.known_poses import proved_over

@@ -60,7 +60,7 @@ class MultiplierSearch:
         self._whole, self._store, self._budget = whole, store, budget
         rows = store.rows[:0] if known is None else known
         self._poses = KnownPoses(whole, rows, budget)
-        self._known, self._spread = known is not None, known is None
+        self._spread = known is None
         self._taken = np.empty(0, dtype=np.int64)
         self.multipliers, self.largest_cost = np.zeros_like(whole.weights), 0
         self.ratio, self.bound = Fraction(0), 0.0
@@ -71,7 +71,7 @@ class MultiplierSearch:
     @property
     def over_known(self) -> float:
         """The most that multipliers prove over the known poses; inf if none are."""
-        return self._poses.most_proved if self._known else float("inf")
+        return self._poses.most_proved
 
     def refute_most(self, n_poses: int) -> None:
         """Refute at once so many poses, or as many as poses in hand leave room for."""

@@ -43,14 +43,14 @@ class KnownPoses:
 
     Attributes:
         most_proved: The most that multipliers prove over the first poses alone, as far
-            as was looked.
+            as was looked; inf if there were none.
     """
 
     def __init__(
         self, whole: WholeRows, rows: NDArray[np.uint64], budget: WorkBudget
     ) -> None:
         self._whole, self._rows = whole, GrowingArray(rows)
-        self._n_first, self.most_proved = len(rows), 0.0
+        self._n_first, self.most_proved = len(rows), 0.0 if len(rows) else float("inf")
         self._program = MultiplierProgram(whole, budget)
 
     def append(self, rows: NDArray[np.uint64]) -> None:

@@ -57,6 +57,18 @@ def test_what_is_spent_where_known_poses_leave_room(least, lit, proved):
     assert least(roomy, 2) == least(COARSE, 2)
 
 
+def test_the_finest_maps_alone_draw_what_cells_are_held_against(least, monkeypatch):
+    drawn, real = [], projector_bound.open_samples
+
+    def noted(scene, limits, *given, **options):
+        drawn.append((limits.closely, limits.min_tangent_angle > 0.0))
+        return real(scene, limits, *given, **options)
+
+    monkeypatch.setattr(projector_bound, "open_samples", noted)
+    assert least(FINER, 3) == 2
+    assert drawn == [(False, False), (False, False), (True, True)]
+
+
 def test_none_are_asked_where_the_work_ended_first(least):
     assert least(replace(FINER, budget=1e5), 3) == 1
 
