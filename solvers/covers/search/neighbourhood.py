@@ -52,9 +52,9 @@ def greedy(
         if cover.limited:
             gains[cover.left(np.array(chosen, dtype=np.int64))[cover.kinds] <= 0] = 0.0
         budget.spend(cover.entries)
-        best = int(np.argmax(gains / cover.costs if n_sets is None else gains))
-        if not gains[best] > 0:
+        if not np.any(gains > 0.0):
             break
+        best = int(np.argmax(gains / cover.costs if n_sets is None else gains))
         chosen.append(best)
         counts[cover.members(best)] += 1
     return np.array(chosen, dtype=np.int64)

@@ -235,6 +235,14 @@ def test_empty_matrices_are_answered(shape):
     assert solve_max_coverage(problem, 0).selected.size == 0
 
 
+def test_sets_without_members_are_an_answer_beside_floors_of_row_sets():
+    floors = {"required_weight": [0.0, 1.0], "row_sets": [0, 1, 1]}
+    problem = CoverProblem(np.zeros((3, 2), dtype=bool), required_total=2.0, **floors)
+    solution = solve_cover(problem)
+    assert solution.status is SolveStatus.INFEASIBLE
+    assert solution.selected.size == 0
+
+
 def test_duplicate_columns_choose_the_cheap_one():
     problem = from_sets([{0, 1}, {0, 1}], 2, costs=np.array([2.0, 1.0]))
     assert solve_cover(problem).selected.tolist() == [1]
