@@ -211,17 +211,26 @@ def test_a_cell_with_a_sample_too_few_is_caught(name, attack_cameras):
     assert {s for _, s in caught.violations} == {sample}
 
 
-@pytest.mark.parametrize("limit", list(TIGHT))
-def test_seen_as_a_point_each_limit_forbids_what_misses_it_by_a_fifth(limit):
+@pytest.mark.parametrize(
+    ("limit", "value", "errors"),
+    [
+        *[(limit, value, None) for limit, value in TIGHT.items()],
+        ("max_sigma_m", 2e-4, CalibrationErrors(angle=3e-4)),
+        ("max_sigma_m", 2e-4, CalibrationErrors(position_m=3e-4)),
+    ],
+)
+def test_seen_as_a_point_each_limit_forbids_what_misses_it_by_a_fifth(
+    limit, value, errors
+):
     """Within 0.1 degrees little is left to chance but where in the image a sample is.
 
     That costs cos^2 of the corner, 0.87, in the size of a ring on the sensor.
     """
-    loose = FREE | {limit: TIGHT[limit]}
+    loose = FREE | {limit: value, "calibration": errors}
     device = LENSES["plain"]
     scene, _, rows = shown(sphere(0.1, subdivisions=3), device, loose)
     samples = rows.target.samples
-    worse = loose | {limit: TIGHT[limit] * (1.2 if limit.startswith("min") else 0.8)}
+    worse = loose | {limit: value * (1.2 if limit.startswith("min") else 0.8)}
     stricter = scene_of(scene.mesh, limits=worse)
     position = np.array([0.5, -0.8, 0.55])
     towards = position - samples.points

@@ -54,19 +54,20 @@ class RingCrossings:
         normals: _Array,
         rings: CodeSurfaces,
         limits: TriangulationLimits,
-        squarely: float,
     ) -> None:
         self._across = np.asfortranarray(rings.normals)
         self._spacing = rings.spacing
         placed = surface_deviation(limits.limited_calibration, rings.levers)
-        self._placed = np.hypot(placed, limits.ring_sigma_m or 0.0) * squarely
+        self._placed = np.hypot(placed, limits.ring_sigma_m or 0.0)
         along = np.cross(normals, self._across)
         self._width = lengths(along)
         along /= np.where(self._width > 0.0, self._width, 1.0)[:, None]
         self._along = np.asfortranarray(along)
 
-    def best(self, k: _Index, cone: Cone, facing: _Array, turn: _Array) -> PairCell:
-        """Return the best of samples k, seen at -N.r of `facing` at most.
+    def best(
+        self, k: _Index, cone: Cone, facing: tuple[_Array, _Array], turn: _Array
+    ) -> PairCell:
+        """Return the best of samples k, seen at least and most squarely: |N.r|.
 
         `turn` is least t |g| / |v| [m].
         """
@@ -74,8 +75,8 @@ class RingCrossings:
         crossing = nearest_cos(np.abs(dot(by_column(self._across, k), u)), cone)
         sine = _least_sine(np.abs(dot(by_column(self._along, k), u)), cone)
         shift, no_noise = turn * self._width[k] * sine, np.zeros(len(k))
-        placed, spacing = self._placed[k], self._spacing[k]
-        return PairCell(crossing, facing, shift, no_noise, spacing, placed)
+        placed, spacing = self._placed[k] * facing[0], self._spacing[k]
+        return PairCell(crossing, facing[1], shift, no_noise, spacing, placed)
 
 
 class PixelCrossings:
@@ -87,14 +88,15 @@ class PixelCrossings:
         coded: CodedPixels,
         limits: TriangulationLimits,
         incidence_cos: _Array,
-        squarely: float,
     ) -> None:
         self._normals, self._beams = normals, coded.beams
         self._cosine = np.clip(incidence_cos, 0.0, 1.0)
         self._sine = np.sqrt(1.0 - self._cosine**2)
-        self._placed = _least_moved(coded, limits, self._cosine) * squarely
+        self._placed = _least_moved(coded, limits, self._cosine)
 
-    def best(self, k: _Index, cone: Cone, facing: _Array, turn: _Array) -> PairCell:
+    def best(
+        self, k: _Index, cone: Cone, facing: tuple[_Array, _Array], turn: _Array
+    ) -> PairCell:
         """Return the best of samples k, as `RingCrossings` does."""
         u, psi = cone.towards, cone.psi
         beams, normals = by_column(self._beams, k), by_column(self._normals, k)
@@ -111,7 +113,8 @@ class PixelCrossings:
         per = np.where(ratio <= sine, self._cosine[k], beyond)
         shift, endless = turn * per * crossing, np.full(len(k), np.inf)
         return PairCell(
-            *(crossing, facing, shift, np.zeros(len(k)), endless, self._placed[k]),
+            *(crossing, facing[1], shift, np.zeros(len(k)), endless),
+            self._placed[k] * facing[0],
             angles=(least, most),
         )
 

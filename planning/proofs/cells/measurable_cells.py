@@ -8,8 +8,10 @@ image's bounds on |g| / |v| and on z / t (`image_cone`)::
     incidence <= theta + psi
     |r.m|   <= cos(max(0, acos|u_c.m| - psi))               must reach min_conditioning
     |N.r|   <= cos(max(0, incidence_c - psi))
-    |g|     >= |w| sin(max(0, angle(u_c, line of w) - psi)) least_turn
-    sigma   >= s_px (t_c - e) |g| / |r.m|                   must not exceed the limit
+            >= cos(min(theta, incidence_c + psi))
+    |v|     >= |w| sin(max(0, angle(u_c, line of w) - psi)),   |g| >= |v| least_turn
+    sigma^2 >= ((s_px t |g|)^2 + (s_v |v|)^2 + (s_m |N.r|)^2) / |r.m|^2
+            for t >= t_c - e; s_v and s_m of errors     must not exceed the limit's
     pitch   <= h |N.r| / ((t_c - e) |g|)                    must reach min_ring_pitch
     z       >= (t_c - e) cos(off axis),  z / (f |N.r|)      must not exceed the limit
 
@@ -33,10 +35,12 @@ from planning.scene.limits.limit import may_hold
 from planning.scene.limits.pair_limits import PAIR_LIMITS
 from planning.scene.measuring.measured import LitSamples
 
-from .crossings import Cone, PixelCrossings, RingCrossings, nearest_cos
+from .crossings import Cone, PixelCrossings, RingCrossings, farthest_cos, nearest_cos
 from .image_cone import ImageCone, image_cone
 
 _Array = NDArray[np.float64]
+
+_TINY = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,11 +77,10 @@ class MeasurableCells:
             turned = errors.about_axis / image.least_turn
             noise = np.sqrt(edge**2 + turned**2 + errors.along_line_px**2)
             self._lenses.append(_Lens(image, device.focal_px, noise))
-        squarely = np.cos(self._camera.max_incidence)
         self._crossings: list[RingCrossings | PixelCrossings] = [
-            PixelCrossings(self._normals, coded, self._pair, cosine, squarely)
+            PixelCrossings(self._normals, coded, self._pair, cosine)
             if isinstance(coded, CodedPixels)
-            else RingCrossings(self._normals, coded, self._pair, squarely)
+            else RingCrossings(self._normals, coded, self._pair)
             for coded, cosine in zip(samples.surfaces, cosines, strict=True)
         ]
 
@@ -91,18 +94,25 @@ class MeasurableCells:
         """Return which samples a camera in a cell may measure, as `CellLimits`."""
         self._check_cancelled()
         cone = Cone.of(towards, psi)
-        facing = nearest_cos(dot(by_column(self._normals, samples), towards), cone)
+        middle = dot(by_column(self._normals, samples), towards)
+        most, least = nearest_cos(middle, cone), farthest_cos(np.abs(middle), cone)
+        least = np.maximum(least, np.cos(self._camera.max_incidence))
+        moved_m = self._pair.limited_calibration.along_axis_m
         admitted = np.zeros(samples.size, dtype=bool)
         for lens in self._lenses:
             depth = nearest * np.cos(lens.image.off_axis)
-            cell = CellView(facing, depth, lens.focal_px)
+            cell = CellView(most, depth, lens.focal_px)
             seen = may_hold(CAMERA_LIMITS, cell, self._camera, len(samples))
             turn = nearest * lens.image.least_turn
             for p, crossing in enumerate(self._crossings):
                 lit = self._lit[p].take(samples)
                 at = np.flatnonzero(lit & seen & ~admitted)
                 k = samples[at]
-                pair = crossing.best(k, cone.take(at), facing[at], turn[at])
-                pair = replace(pair, noise=lens.noise_px[p].take(k))
+                facing = least[at], most[at]
+                pair = crossing.best(k, cone.take(at), facing, turn[at])
+                # As pixels, so that times t |g| they are at least what moves by |v|.
+                moved = moved_m / np.maximum(turn[at], _TINY)
+                noise = np.hypot(lens.noise_px[p].take(k), moved)
+                pair = replace(pair, noise=noise)
                 admitted[at] = may_hold(PAIR_LIMITS, pair, self._pair, len(k))
         return admitted
