@@ -13,7 +13,6 @@ from planning.proofs.all_poses import (
     joined,
     with_existing_alone,
 )
-from planning.proofs.moved_poses import free_devices
 from planning.proofs.projector_bound import bound_projectors
 from planning.proofs.quotas import RegionFloors
 from planning.proofs.selection import fewest_count, select_fewest
@@ -25,7 +24,7 @@ from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
 from .candidate_set import CandidateSource
-from .free_projectors import ProjectorOffer
+from .moved_projectors import ProjectorOffer, moved_projectors
 from .projector_stage import ProjectorStage
 
 
@@ -80,7 +79,7 @@ def _better(
     if better is not stage or bound.proof().lower_bound > fewer:
         return better
     offer = ProjectorOffer(source, stage.candidates)
-    found = free_devices(offer, fewer, effort.starts)
+    found = moved_projectors(offer, fewer, effort.starts)
     return _with_more(stage, found) if found else stage
 
 

@@ -43,7 +43,7 @@ class Effort:
             twice as fine, where known poses leave room for a proof.
         where_room: What is spent instead, where known poses leave that room.
         most_cells: Multisets of more aren't searched for long.
-        starts: Searches for projectors between the bound and the count.
+        starts: Searches for fewer devices between the bound and the count.
         aims: As `finest`, of the aims of cameras whose image the object overflows;
             None: cells aren't cut by aim.
     """

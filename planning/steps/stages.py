@@ -11,7 +11,7 @@ from planning.cameras.camera_cover import (
 )
 from planning.cameras.camera_routes import Widened, cheapest, widest_routes
 from planning.cameras.camera_stage import CameraSolution, follow_cameras
-from planning.cameras.free_cameras import has_room, one_camera_fewer
+from planning.cameras.fewer_cameras import fewer_cameras, has_room
 from planning.cameras.proved_cameras import CameraStage, bound_stage
 from planning.model.document.certificates import Certificate
 from planning.model.document.ring_records import RingAxis
@@ -220,7 +220,7 @@ def bounded_cameras(partial: PartialPlan, clock: Stopwatch) -> PartialPlan:
 
 
 def with_fewer_cameras(partial: PartialPlan, clock: Stopwatch) -> PartialPlan | None:
-    """One camera fewer, where any is found between the bound and the count; else None.
+    """Fewer cameras, where any are found between the bound and the count; else None.
 
     The paper's route stays what it is, where it was asked for, and so do cameras that
     survive losses.
@@ -231,8 +231,8 @@ def with_fewer_cameras(partial: PartialPlan, clock: Stopwatch) -> PartialPlan | 
     if not has_room(stage):
         return None
     effort = camera_bound.PROVE if request.prove else camera_bound.DEFAULT
-    with clock.stage("cameras", "cameras: one fewer, between the bound and the count"):
-        fewer = one_camera_fewer(
+    with clock.stage("cameras", "cameras: fewer, between the bound and the count"):
+        fewer = fewer_cameras(
             partial.scene.among(partial.projectors),
             partial.projectors,
             stage,

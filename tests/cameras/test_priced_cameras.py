@@ -1,4 +1,4 @@
-"""Cameras moved one at a time find what few candidates miss."""
+"""Cameras that prices ask for find what few candidates miss."""
 
 from dataclasses import replace
 
@@ -16,14 +16,13 @@ from planning.cameras.camera_cover import (
     measured_of,
     plan_cameras,
 )
-from planning.cameras.free_cameras import CameraOffer, has_room, one_camera_fewer
+from planning.cameras.fewer_cameras import fewer_cameras, has_room
+from planning.cameras.priced_cameras import priced_poses
 from planning.cameras.proved_cameras import bound_stage, camera_stage
 from planning.model.devices.bodies import Existing
 from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.proofs import camera_bound
 from planning.proofs.all_poses import Effort
-from planning.proofs.moved_poses import _Moves, free_devices
-from planning.proofs.selection import CandidateCover
 from planning.rig.rig import Rig, load_rig
 from planning.scene.draws import DRAWS
 from planning.scene.lights import ring_frame
@@ -69,7 +68,7 @@ def test_two_cameras_measure_what_takes_three_of_forty_candidates():
     scene, stage = staged(40)
     assert stage.certificate.needed.count == 3
     assert stage.certificate.continuous.lower_bound == 2
-    fewer = one_camera_fewer(scene, PROJECTORS, stage, starts=1)
+    fewer = fewer_cameras(scene, PROJECTORS, stage, 2)
     needed = fewer.certificate.needed
     assert (needed.count, needed.lower_bound) == (2, 2)
     assert fewer.certificate.status == "optimal"
@@ -79,9 +78,17 @@ def test_two_cameras_measure_what_takes_three_of_forty_candidates():
     )
     measured = measured_by(scene, fewer.cameras, fresh).any(axis=1)
     assert measured.mean() > 0.96
-    again = one_camera_fewer(scene, PROJECTORS, stage, starts=1)
+    again = fewer_cameras(scene, PROJECTORS, stage, 2)
     for one, other in zip(fewer.cameras, again.cameras, strict=True):
         np.testing.assert_array_equal(one.world_from_device, other.world_from_device)
+
+
+def test_what_prices_refute_is_not_sought():
+    """One camera sees less than half of a ball, and so does each projector light."""
+    scene, stage = staged(40)
+    assert priced_poses(scene, stage.cover, 1) == ()
+    assert len(priced_poses(scene, stage.cover, 2)) > 0
+    assert fewer_cameras(scene, PROJECTORS, stage, 0) is None
 
 
 def test_where_the_bound_is_the_count_no_camera_is_looked_for():
@@ -99,23 +106,10 @@ def test_cameras_that_stand_already_stay():
     scene, stage = staged(12, existing=[old])
     count = stage.certificate.needed.count
     assert has_room(stage)
-    fewer = one_camera_fewer(scene, PROJECTORS, stage, starts=1)
+    fewer = fewer_cameras(scene, PROJECTORS, stage, 2)
     assert fewer.certificate.needed.count < count
     assert fewer.certificate.given == 1
     np.testing.assert_array_equal(fewer.cameras[0].world_from_device, pose)
-
-
-def test_what_fresh_samples_deny_is_not_taken(monkeypatch):
-    scene, stage = staged(40)
-    offer, asked = CameraOffer(scene, PROJECTORS, stage.cover), []
-
-    def denied(_, devices, draw):
-        asked.append((len(devices), draw))
-        return False
-
-    monkeypatch.setattr(CameraOffer, "confirms", denied)
-    assert free_devices(offer, 2, 1) == ()
-    assert len({draw for _, draw in asked}) == len(asked) > 1
 
 
 @pytest.fixture(scope="module")
@@ -125,7 +119,7 @@ def firsts():
 
 @pytest.fixture
 def _few_poses(monkeypatch, firsts):
-    """So few cameras are offered that moved ones save some; all begin from the same."""
+    """So few cameras are offered that others save some; all begin from the same."""
     work_little(monkeypatch, every_pose=True)
     monkeypatch.setattr(Rig, "n_projector_poses", 160)
     monkeypatch.setattr(Rig, "n_camera_poses", 14)
@@ -160,7 +154,7 @@ def planned():
 def test_a_plan_takes_fewer_cameras_than_its_candidates_need(monkeypatch):
     """Its poses join the candidates, over which the count is proved and audited."""
     effort, proofs = camera_bound.DEFAULT, []
-    for starts in (0, 1):
+    for starts in (0, 2):
         monkeypatch.setattr(camera_bound, "DEFAULT", replace(effort, starts=starts))
         plan = planned()
         proof = plan.document.certificates.cameras
@@ -170,7 +164,7 @@ def test_a_plan_takes_fewer_cameras_than_its_candidates_need(monkeypatch):
     without, with_ = proofs
     assert with_.needed.count < without.needed.count
     assert with_.candidates.n_candidates > without.candidates.n_candidates == 14
-    assert "one moved at a time" in with_.routes.why
+    assert "prices" in with_.routes.why
 
 
 @pytest.mark.long
@@ -205,14 +199,3 @@ def test_fresh_samples_deny_cameras_that_measure_too_little_of_them():
     assert denial(*given, chosen, fresh) is None
     seen = denial(*given, chosen[:1], fresh)
     np.testing.assert_array_equal(seen, measured_of(*given, fresh)[1])
-
-
-def test_what_poses_cover_beside_the_known_ones_is_required_too():
-    known = np.zeros((10, 1), dtype=bool)
-    known[:4] = True
-    moves = _Moves(None, CandidateCover(known, 1.0), np.random.default_rng(0))
-    covered = np.arange(10) < 6
-    assert moves.missed(covered) == 0.0
-    covered[0] = False
-    # Six are required then, and five of them covered.
-    assert abs(moves.missed(covered) - 1.0 / 6.0) < 1e-12

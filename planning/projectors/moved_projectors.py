@@ -1,4 +1,4 @@
-"""One device fewer from poses anywhere in the workspace, one moved at a time.
+"""One projector fewer from poses anywhere in the workspace, one moved at a time.
 
 Where the bound over all poses is below the count, either the bound is weak or free
 poses need one fewer. Each pose in turn goes to the best of those around it, given what
@@ -9,18 +9,20 @@ fitted to its samples, so fresh ones must confirm it.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from planning.model.devices.planned import PlannedCamera, PlannedProjector
+from planning.model.devices.planned import PlannedProjector
+from planning.proofs.quotas import Quotas, RegionFloors, missed_shares
+from planning.proofs.selection import CandidateCover
+from planning.scene.lighting import lit_stages
+from planning.scene.limits.projector_limits import LIT
 from solvers import solve_max_coverage
 
-from .quotas import Quotas, RegionFloors, missed_shares
-from .selection import CandidateCover
+from .candidate_set import CandidateSet, CandidateSource
+from .fewest_projectors import confirms
 
-_D = TypeVar("_D", PlannedProjector, PlannedCamera)
 _Mask = NDArray[np.bool_]
 
 # How far poses are offered around one, in spacings of a lattice of so many; from the
@@ -40,57 +42,68 @@ _BUDGET = 1e8
 _FIRST_DRAW = 30
 
 
-class Offer(Protocol[_D]):
-    """Devices of a kind: which are known, and what any cover."""
+@dataclass(frozen=True, eq=False)
+class ProjectorOffer:
+    """Known poses of projectors, and what gives others around them."""
+
+    source: CandidateSource
+    candidates: CandidateSet
 
     @property
-    def known(self) -> tuple[_D, ...]:
-        """Candidates; existing devices are the first."""
-        ...
+    def known(self) -> tuple[PlannedProjector, ...]:
+        """The candidates."""
+        return self.candidates.projectors
 
     @property
     def cover(self) -> CandidateCover:
-        """What they cover, and a share of it that is required."""
-        ...
+        """What they light."""
+        return self.candidates.cover
 
-    def around(self, device: _D, n_lattice: int, scale: float) -> tuple[_D, ...]:
-        """Return others around one, as far out as is that share of a lattice's step."""
-        ...
+    def around(
+        self, device: PlannedProjector, n_lattice: int, scale: float
+    ) -> tuple[PlannedProjector, ...]:
+        """Return poses around one, every other one far from the object."""
+        return self.source.around((device,), n_lattice, scale, far=True)
 
-    def covers(self, devices: Sequence[_D], samples: NDArray[np.int64]) -> _Mask:
-        """Return which of some samples (row) each device (column) covers."""
-        ...
+    def covers(
+        self, devices: Sequence[PlannedProjector], samples: NDArray[np.int64]
+    ) -> NDArray[np.bool_]:
+        """Return which of some samples each lights."""
+        some = self.candidates.samples.take(samples)
+        return lit_stages(self.candidates.scene, devices, some) == LIT
 
-    def confirms(self, devices: tuple[_D, ...], draw: int) -> bool:
-        """Return whether devices cover what is required of a draw of fresh samples."""
-        ...
+    def confirms(self, devices: tuple[PlannedProjector, ...], draw: int) -> bool:
+        """Return whether they light enough of fresh samples."""
+        return confirms(self.candidates, devices, draw)
 
 
-def free_devices(offer: Offer[_D], n_devices: int, starts: int) -> tuple[_D, ...]:
+def moved_projectors(
+    offer: ProjectorOffer, n_projectors: int, starts: int
+) -> tuple[PlannedProjector, ...]:
     """Return poses that, with existing ones, cover what is required; () if none do.
 
     Args:
         offer: Known poses, and what gives others.
-        n_devices: One fewer than of these are needed.
+        n_projectors: One fewer than of these are needed.
         starts: Searches; each but the first begins where the best so far ended, with
             one of its poses anywhere.
     """
     cover = offer.cover
-    if not starts or n_devices <= cover.n_existing:
+    if not starts or n_projectors <= cover.n_existing:
         return ()
-    rng = np.random.default_rng([cover.seed, n_devices])
+    rng = np.random.default_rng([cover.seed, n_projectors])
     moves = _Moves(offer, cover, rng)
     chosen = solve_max_coverage(
-        cover.problem, n_devices, seed=cover.seed, budget=_BUDGET
+        cover.problem, n_projectors, seed=cover.seed, budget=_BUDGET
     ).selected
-    if len(chosen) < n_devices:
+    if len(chosen) < n_projectors:
         return ()
     best, found = moves.moved(_Poses.of(offer, cover, chosen))
     for _ in range(1, starts):
         if found or moves.missed(best.covered) > _HOPELESS:
             break
         other = int(rng.integers(cover.n_existing, len(offer.known)))
-        i = int(rng.integers(cover.n_existing, n_devices))
+        i = int(rng.integers(cover.n_existing, n_projectors))
         kicked = best.with_pose(i, offer.known[other], cover.covers[:, other])
         poses, found = moves.moved(kicked)
         if moves.missed(poses.covered) <= moves.missed(best.covered):
@@ -99,16 +112,16 @@ def free_devices(offer: Offer[_D], n_devices: int, starts: int) -> tuple[_D, ...
 
 
 @dataclass(frozen=True, eq=False)
-class _Poses(Generic[_D]):
-    """Devices, and which of the samples each covers, (n, k)."""
+class _Poses:
+    """Projectors, and which of the samples each lights, (n, k)."""
 
-    devices: tuple[_D, ...]
+    devices: tuple[PlannedProjector, ...]
     covers: _Mask
 
     @classmethod
     def of(
-        cls, offer: Offer[_D], cover: CandidateCover, chosen: NDArray[np.int64]
-    ) -> "_Poses[_D]":
+        cls, offer: ProjectorOffer, cover: CandidateCover, chosen: NDArray[np.int64]
+    ) -> "_Poses":
         known = offer.known
         return cls(tuple(known[i] for i in chosen), cover.covers[:, chosen])
 
@@ -116,20 +129,20 @@ class _Poses(Generic[_D]):
     def covered(self) -> _Mask:
         return np.any(self.covers, axis=1)
 
-    def with_pose(self, i: int, device: _D, covers: _Mask) -> "_Poses[_D]":
+    def with_pose(self, i: int, device: PlannedProjector, covers: _Mask) -> "_Poses":
         devices, columns = list(self.devices), self.covers.copy()
         devices[i], columns[:, i] = device, covers
         return _Poses(tuple(devices), columns)
 
 
 @dataclass(frozen=True, eq=False)
-class _Moves(Generic[_D]):
+class _Moves:
     """Moves poses one at a time.
 
     `rng` says in which order poses move, and how far off others are offered.
     """
 
-    offer: Offer[_D]
+    offer: ProjectorOffer
     cover: CandidateCover
     rng: np.random.Generator
 
@@ -137,7 +150,7 @@ class _Moves(Generic[_D]):
     def _reached(self) -> _Mask:
         return np.any(self.cover.covers, axis=1)
 
-    def moved(self, poses: _Poses[_D]) -> tuple[_Poses[_D], bool]:
+    def moved(self, poses: _Poses) -> tuple[_Poses, bool]:
         """Return poses where none is better near by, and if fresh samples agree."""
         scale, attempt = _FARTHEST, 0
         while scale > _NEAREST:
@@ -157,7 +170,7 @@ class _Moves(Generic[_D]):
                 break
         return poses, False
 
-    def _better(self, poses: _Poses[_D], i: int, scale: float) -> _Poses[_D]:
+    def _better(self, poses: _Poses, i: int, scale: float) -> _Poses:
         """Return the poses with one of them where it leaves least to be covered.
 
         Around where it is, or where one of the best known poses is.
