@@ -56,8 +56,9 @@ def fewer_by_prices(
         if not more:
             break
         found = cover_by_cover(scene, projectors, found.candidates.joined(more))
-        if found.selection.needed < needed:
-            best, needed = found, found.selection.needed
+        selection = found.selection
+        if selection.needed < needed and selection.status != "infeasible":
+            best, needed = found, selection.needed
         else:
             tries -= 1
     return best
@@ -105,6 +106,9 @@ def priced_poses(
         devices += [offered[k] for k in dearer]
         covers = np.hstack([covers, measured[:, dearer]])
         poses.append(pack_rows(measured[:, dearer].T))
+    else:
+        # What the last poses change is told by prices that know them.
+        proposal = poses.proposed(count)
     if count == n_cameras - given and proposal is not None and _refutes(proposal):
         return ()
     return tuple(devices[len(found.candidates.cameras) :])
