@@ -17,8 +17,12 @@ from planning.cameras.camera_cover import (
     measured_of,
     plan_cameras,
 )
-from planning.cameras.fewer_cameras import fewer_cameras, has_room
-from planning.cameras.priced_cameras import fewer_by_prices, priced_poses
+from planning.cameras.priced_cameras import (
+    fewer_by_prices,
+    fewer_cameras,
+    has_room,
+    priced_poses,
+)
 from planning.cameras.proved_cameras import bound_stage, camera_stage
 from planning.model.devices.bodies import Body, Existing
 from planning.model.devices.planned import PlannedCamera, PlannedProjector
