@@ -29,7 +29,7 @@ from geometry.mesh.mesh import TriangleMesh
 from planning import load_rig
 from planning.cameras.camera_cover import camera_candidate_views
 from planning.cameras.camera_stage import place_cameras
-from planning.cameras.fewer_cameras import fewer_cameras, has_room
+from planning.cameras.priced_cameras import fewer_cameras, has_room
 from planning.cameras.proved_cameras import bound_stage
 from planning.model.devices.planned import PlannedCamera
 from planning.model.errors import InfeasibleLimitsError

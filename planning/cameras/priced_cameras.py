@@ -25,6 +25,9 @@ from solvers.status import WorkBudget
 
 from .camera_cover import CameraCover, candidate_cover
 from .camera_routes import cover_by_cover
+from .proved_cameras import CameraStage, camera_stage
+
+_WHY = "fewer; found from poses between the candidates that prices asked for"
 
 # How far out poses are offered, in spacings of a lattice of so many; how many at a
 # time, as many around each of the dearest, so many at least; and samples at most.
@@ -37,6 +40,38 @@ _SAMPLES = 3000
 _GAINS = 6.0
 # Counted work of the program.
 _BUDGET = 1e10
+
+
+def has_room(stage: CameraStage) -> bool:
+    """Return whether the bound over all poses leaves room for fewer cameras.
+
+    Cameras with bodies aren't looked at.
+    """
+    proof = stage.certificate
+    bound = proof.continuous
+    if bound is None or proof.status == "infeasible" or stage.cover.has_bodies:
+        return False
+    return bound.lower_bound < proof.needed.count
+
+
+def fewer_cameras(
+    scene: Scene,
+    projectors: tuple[PlannedProjector, ...],
+    stage: CameraStage,
+    tries: int,
+) -> CameraStage | None:
+    """Return the stage of fewer cameras from poses anywhere; None: none were found.
+
+    They join the candidates, over which the count is proved again.
+    """
+    again = fewer_by_prices(scene, projectors, stage.cover, tries)
+    if again is None:
+        return None
+    routes = stage.routes
+    if routes is not None:
+        needed = again.selection.needed
+        routes = routes.changed(cover=needed, taken="cover", why=_WHY)
+    return camera_stage(scene, again, routes)
 
 
 def fewer_by_prices(
@@ -56,8 +91,9 @@ def fewer_by_prices(
         if not more:
             break
         found = cover_by_cover(scene, projectors, found.candidates.joined(more))
-        if found.selection.needed < needed:
-            best, needed = found, found.selection.needed
+        selection = found.selection
+        if selection.needed < needed and selection.status != "infeasible":
+            best, needed = found, selection.needed
         else:
             tries -= 1
     return best
@@ -105,6 +141,9 @@ def priced_poses(
         devices += [offered[k] for k in dearer]
         covers = np.hstack([covers, measured[:, dearer]])
         poses.append(pack_rows(measured[:, dearer].T))
+    else:
+        # What the last poses change is told by prices that know them.
+        proposal = poses.proposed(count)
     if count == n_cameras - given and proposal is not None and _refutes(proposal):
         return ()
     return tuple(devices[len(found.candidates.cameras) :])

@@ -11,7 +11,7 @@ from planning.cameras.camera_cover import (
 )
 from planning.cameras.camera_routes import Widened, cheapest, widest_routes
 from planning.cameras.camera_stage import CameraSolution, follow_cameras
-from planning.cameras.fewer_cameras import fewer_cameras, has_room
+from planning.cameras.priced_cameras import fewer_cameras, has_room
 from planning.cameras.proved_cameras import CameraStage, bound_stage
 from planning.model.document.certificates import Certificate
 from planning.model.document.ring_records import RingAxis

@@ -10,16 +10,21 @@ from support.little_work import work_little
 from geometry.poses import look_at
 from geometry.shapes.primitives import sphere
 from planning import pipeline, plan_rig
+from planning.cameras import priced_cameras
 from planning.cameras.camera_cover import (
     camera_candidate_views,
     denial,
     measured_of,
     plan_cameras,
 )
-from planning.cameras.fewer_cameras import fewer_cameras, has_room
-from planning.cameras.priced_cameras import priced_poses
+from planning.cameras.priced_cameras import (
+    fewer_by_prices,
+    fewer_cameras,
+    has_room,
+    priced_poses,
+)
 from planning.cameras.proved_cameras import bound_stage, camera_stage
-from planning.model.devices.bodies import Existing
+from planning.model.devices.bodies import Body, Existing
 from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.proofs import camera_bound
 from planning.proofs.all_poses import Effort
@@ -91,6 +96,29 @@ def test_what_prices_refute_is_not_sought():
     assert fewer_cameras(scene, PROJECTORS, stage, 0) is None
 
 
+def test_the_last_poses_offered_count_too(monkeypatch):
+    """Whether prices refute two cameras is asked again once they are known."""
+    scene, stage = staged(40)
+    monkeypatch.setattr(priced_cameras, "_SCALES", priced_cameras._SCALES[:1])
+    assert len(priced_poses(scene, stage.cover, 2)) > 0
+
+
+def test_fewer_of_which_there_are_too_few_are_no_gain(monkeypatch):
+    """Of a stock that isn't enough, `needed` counts devices that aren't there."""
+    scene, stage = staged(40)
+    again = priced_cameras.cover_by_cover
+
+    def out_of_stock(*given):
+        cover = again(*given)
+        short = replace(cover.selection, status="infeasible")
+        return replace(cover, selection=short)
+
+    given = scene, PROJECTORS, stage.cover, 1
+    assert fewer_by_prices(*given).selection.needed == 2
+    monkeypatch.setattr(priced_cameras, "cover_by_cover", out_of_stock)
+    assert fewer_by_prices(*given) is None
+
+
 def test_where_the_bound_is_the_count_no_camera_is_looked_for():
     _, stage = staged(40)
     assert has_room(stage)
@@ -110,6 +138,20 @@ def test_cameras_that_stand_already_stay():
     assert fewer.certificate.needed.count < count
     assert fewer.certificate.given == 1
     np.testing.assert_array_equal(fewer.cameras[0].world_from_device, pose)
+
+
+def test_what_is_offered_has_no_body_of_a_camera_that_stands_already():
+    """Its own `[existing.body]`, where the rig's cameras have none."""
+    pose = look_at(np.array((0.2, -0.9, 0.6)), np.zeros(3), UP)
+    rows = tuple(tuple(row) for row in pose.tolist())
+    body = Body((0.0, 0.0, -0.06), (0.03, 0.03, 0.06))
+    scene, stage = staged(12, existing=[Existing("old", "camera", rows, body)])
+    assert has_room(stage)
+    fewer = fewer_cameras(scene, PROJECTORS, stage, 2)
+    assert [camera.body for camera in fewer.reference] == [
+        body,
+        *[None] * (len(fewer.reference) - 1),
+    ]
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,7 @@ from proofs.test_camera_bound import FREE, LENSES, _rotations, _turned_by, scene
 from geometry.shapes.primitives import sphere
 from planning.model.devices.calibration_errors import CalibrationErrors
 from planning.model.light.dense_code import DenseCode
+from planning.proofs.cells.crossings import Cone, farthest_cos
 from planning.proofs.cells.measurable_cells import MeasurableCells
 from planning.scene.codes.surfaces import CodedPixels, PanelLight, PanelRays
 from planning.scene.draws import Draw
@@ -107,3 +108,14 @@ def test_seen_as_a_point_little_is_left_to_chance():
         sure = np.abs(met - next(iter(limits.values()))) > 2e-3
         assert np.array_equal(admitted[sure], expected[sure])
         assert 20 < admitted.sum() < N - 20
+
+
+def test_the_least_cosine_is_no_larger_where_the_cosine_rounds_to_one():
+    """Of a line 1e-8 off the middle of the cone, a cosine in float64 is 1."""
+    off = np.linspace(0.0, 2e-8, 41)[:, None]
+    psi = np.linspace(0.01, 1.57, 60)[None, :]
+    cone = Cone(off, psi, np.cos(psi), np.sin(psi))
+    least, exact = farthest_cos(np.cos(off), cone), np.cos(psi + off)
+    assert np.any(np.cos(off[1:]) == 1.0)
+    assert np.all(least <= exact * (1.0 + 1e-12))
+    np.testing.assert_allclose(least, exact, atol=2e-7)

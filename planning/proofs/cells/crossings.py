@@ -25,6 +25,9 @@ from planning.scene.limits.pair_quality import PairCell
 _Array = NDArray[np.float64]
 _Index = NDArray[np.int64]
 
+# What rounding of unit vectors and of their product takes from 1 - c^2, and more.
+_SQUARE_ROUNDING = 1e-14
+
 
 @dataclass(frozen=True, eq=False)
 class Cone:
@@ -150,10 +153,12 @@ def farthest_cos(c: _Array, cone: Cone) -> _Array:
 
     Of a vector of length 0 it is 0.
     """
-    s = np.sqrt(np.maximum(1.0 - c * c, 0.0))
+    # A cosine near 1 tells its sine only to 1e-8, by which psi would be too small.
+    s = np.sqrt(np.maximum(1.0 - c * c, 0.0) + _SQUARE_ROUNDING)
     # At a right angle and beyond, the line is crossed.
     crossed = (c <= cone.sine) | (cone.psi >= 0.5 * np.pi)
-    return np.where(crossed, 0.0, c * cone.cosine - s * cone.sine)
+    least = np.maximum(c * cone.cosine - s * cone.sine, 0.0)
+    return np.where(crossed, 0.0, least)
 
 
 def _least_sine(c: _Array, cone: Cone) -> _Array:

@@ -15,9 +15,12 @@ _D = TypeVar("_D", PlannedProjector, PlannedCamera)
 
 
 def one_of_each(devices: Iterable[_D]) -> tuple[_D, ...]:
-    """Return the first device of each model, as templates that stand nowhere."""
+    """Return the first device of each model, as templates that stand nowhere.
+
+    One that stands already may have a body, or rings, of its own: others come first.
+    """
     models: dict[str, _D] = {}
-    for device in devices:
+    for device in sorted(devices, key=lambda one: bool(one.existing)):
         models.setdefault(device.model, replace(device, existing=""))
     return tuple(models.values())
 
