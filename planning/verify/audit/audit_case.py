@@ -1,7 +1,7 @@
 """What every part of the audit looks at: the plan, and what was recomputed of it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -95,6 +95,17 @@ class AuditCase:
     def reachable(self) -> Reachable:
         """What reference poses could do, which pixels needn't wait for."""
         return what_any_could(self.plan, self.actual, self.shadow, self.seed)
+
+    def drawn_again(self, times: int) -> "AuditCase":
+        """Return the same of other samples, so many times as many."""
+        limits, n = self.plan.requirements, times * len(self.samples)
+        surface = self.plan.surface
+        samples = draw_samples(surface, limits.target, n, self.seed, again=True)
+        return replace(
+            self,
+            actual=what_devices_do(self.plan, samples, self.shadow),
+            estimator=replace(self.estimator, samples=samples),
+        )
 
     @cached_property
     def projectors(self) -> tuple[AuditProjector, ...]:

@@ -51,17 +51,20 @@ class AuditSamples:
         return AuditSamples(*[rows_of(c, chosen) for c in vars(self).values()])
 
 
-def draw_samples(surface: Surface, target: str, n: int, seed: int) -> AuditSamples:
+def draw_samples(
+    surface: Surface, target: str, n: int, seed: int, *, again: bool = False
+) -> AuditSamples:
     """Draw n points: half of them in the target, half outside, each part uniformly.
 
     Within a part, faces are drawn with probability proportional to their area, and the
     barycentric coordinates are uniform on the simplex. Where the target, `dominant` or
-    `surface`, is the whole surface all n fall in it.
+    `surface`, is the whole surface all n fall in it. Those drawn `again` are others.
 
     Raises:
         PlanFileError: If the target has no area.
     """
-    rng = _generator(surface, seed)
+    # Regions have the streams from 1.
+    rng = _generator(surface, seed, *([0] if again else []))
     inside = surface.target_faces(target)
     areas = surface.mesh.face_areas
     if not areas[inside].sum() > 0.0:

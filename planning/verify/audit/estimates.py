@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import gammaln, ndtr
 
 from geometry.arrays import Array, Mask
 
@@ -11,6 +12,8 @@ from .audit_samples import AuditSamples
 
 # What is promised: 1 percentage point of the area that a claim is a share of.
 POINT = 0.01
+# How surely a claim is false that is called so: three standard errors of a normal one.
+DOUBT = float(ndtr(-3.0))
 # Room for the rounding of written numbers, as a share.
 ROUNDING = 1e-6
 # A plan that states fewer samples than this earns no more tolerance for it.
@@ -100,6 +103,26 @@ def pooled_error(count: float, n: int, claimed: float, n_claimed: float) -> floa
     """
     p = (count + claimed * n_claimed + 1.0) / (n + n_claimed + 2.0)
     return float(_of_difference(np.clip(p, 0.0, 1.0), n, n_claimed))
+
+
+def chance_below(most: float, n: int, rank: int, n_claimed: int) -> float:
+    """Return the chance that at most so many of n samples lie below one of the plan's.
+
+    Below the `rank`-th, from 1, of its n_claimed, whatever the distribution, without
+    ties. Each order of all of them is as likely, so with m = n_claimed, r = rank::
+
+        P(i lie below) = C(i + r - 1, i) C(n - i + m - r, n - i) / C(n + m, n)
+
+    That is skewed where the rank is near an end, and wide where the plan's are few.
+    """
+    i = np.arange(int(np.clip(np.floor(most), -1, n)) + 1, dtype=np.float64)
+    ways = _log_choose(i + rank - 1, i)
+    ways = ways + _log_choose(n - i + n_claimed - rank, n - i)
+    return float(np.exp(ways - _log_choose(np.array(n + n_claimed), n)).sum())
+
+
+def _log_choose(n: Array, k: Array | int) -> Array:
+    return gammaln(n + 1.0) - gammaln(np.add(k, 1.0)) - gammaln(n - k + 1.0)
 
 
 def _of_difference(p: Array, n: int, n_claimed: float) -> Array:

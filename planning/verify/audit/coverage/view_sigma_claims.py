@@ -16,8 +16,8 @@ def audit_view_sigma(case: AuditCase, findings: AuditFindings) -> None:
     """Check `coverage.sigma` by the best pair of each measured sample."""
     claims = case.plan.coverage
     if "sigma" in claims.model_fields_set:
-        terms = _best_pairs(case)
-        audit_deviations(case, terms, ("matches",), findings.at("coverage.sigma"))
+        below = findings.at("coverage.sigma")
+        audit_deviations(case, _best_pairs, ("matches",), below)
 
 
 def _best_pairs(case: AuditCase) -> dict[str, Array]:
