@@ -280,11 +280,12 @@ def short_of(plan: Claimed) -> tuple[bool, bool]:
 
 
 def one_device_more(
-    partial: PartialPlan, plan: Claimed, clock: Stopwatch
+    partial: PartialPlan, plan: Claimed, clock: Stopwatch, axis: RingAxis | None = None
 ) -> PartialPlan | None:
     """One device more where fresh samples don't confirm a cover that met its own.
 
-    The proved bound stays what it is; the count is then above it, and says so.
+    The proved bound stays what it is; the count is then above it, and says so. Ring
+    axes stand as given, or else as was asked.
     """
     required = plan.requirements
     unlit, unmeasured = short_of(plan)
@@ -295,7 +296,7 @@ def one_device_more(
         stage = _one_projector_more(partial.stage, required.max_projectors)
         if stage is not None:
             clock.say("  fresh samples fall short: one projector more")
-            return placed(partial.ready, stage, clock)
+            return placed(partial.ready, stage, clock, axis)
     if unmeasured:
         views = larger(partial.camera_stage, partial.cameras, required.max_cameras)
         if views is not None:

@@ -188,7 +188,7 @@ class _Joint:
             if plan is self.plan:
                 return
             # Fresh samples may fall short of a cover that is enough for its own.
-            partial = one_device_more(partial, plan, self.clock)
+            partial = one_device_more(partial, plan, self.clock, partial.axes)
 
     def _by_poses(self, offer: JointOffer) -> None:
         """Leave a device out and move the others, as long as that does."""

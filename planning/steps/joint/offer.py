@@ -104,8 +104,12 @@ def joint_offer(partial: PartialPlan) -> JointOffer:
 def with_axes(
     partial: PartialPlan, projectors: Sequence[PlannedProjector]
 ) -> tuple[PlannedProjector, ...]:
-    """Return projectors with their rings about what they light, where they have any."""
-    if partial.axes is None or not projectors:
+    """Return candidates with ring axes of the kind that the plan's have.
+
+    Centred ones are about what each lights, free ones stand as the candidates', with
+    all rings: axes of both kinds in a plan would be neither.
+    """
+    if partial.axes != "centred" or not projectors:
         return tuple(projectors)
     return centred_axes(partial.scene, projectors, partial.request.ring_margin)
 
