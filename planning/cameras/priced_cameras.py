@@ -37,7 +37,7 @@ _OFFERED, _EACH = 600, 4
 _SAMPLES = 3000
 # What prices prove beyond the count is given up if it is more than so many times what
 # the last poses took from it.
-_GAINS = 6.0
+_GAINS = 15.0
 # Counted work of the program.
 _BUDGET = 1e10
 
