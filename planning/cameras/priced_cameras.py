@@ -45,11 +45,12 @@ _BUDGET = 1e10
 def has_room(stage: CameraStage) -> bool:
     """Return whether the bound over all poses leaves room for fewer cameras.
 
-    Cameras with bodies aren't looked at.
+    Also where fewer are allowed than the candidates need. Cameras with bodies aren't
+    looked at.
     """
     proof = stage.certificate
     bound = proof.continuous
-    if bound is None or proof.status == "infeasible" or stage.cover.has_bodies:
+    if bound is None or stage.cover.has_bodies:
         return False
     return bound.lower_bound < proof.needed.count
 

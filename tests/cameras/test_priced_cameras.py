@@ -54,11 +54,12 @@ PROJECTORS = (
 )
 
 
-def staged(n_candidates, *, existing=(), share=0.97):
+def staged(n_candidates, *, existing=(), share=0.97, most=None):
     """The fewest of so few candidates for two projectors, and their bound."""
     required = make_requirements(
         BALL, load_rig("default"), max_projectors=9, coverage=share
     )
+    required = replace(required, max_cameras=most)
     limits = replace(required.triangulation, min_ring_pitch_px=None)
     required = replace(required, triangulation=limits, existing=tuple(existing))
     scene = make_scene(BALL, required)
@@ -86,6 +87,17 @@ def test_two_cameras_measure_what_takes_three_of_forty_candidates():
     again = fewer_cameras(scene, PROJECTORS, stage, 2)
     for one, other in zip(fewer.cameras, again.cameras, strict=True):
         np.testing.assert_array_equal(one.world_from_device, other.world_from_device)
+
+
+def test_as_many_as_are_allowed_are_found_where_candidates_need_more():
+    scene, stage = staged(40, most=2)
+    assert stage.certificate.status == "infeasible"
+    assert stage.certificate.needed.count == 3
+    assert has_room(stage)
+    fewer = fewer_cameras(scene, PROJECTORS, stage, 1).certificate
+    assert (fewer.count, fewer.needed.count, fewer.status) == (2, 2, "optimal")
+    scene, stage = staged(40, most=1)
+    assert fewer_cameras(scene, PROJECTORS, stage, 1) is None
 
 
 def test_what_prices_refute_is_not_sought():
