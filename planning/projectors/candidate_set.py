@@ -143,12 +143,6 @@ class CandidateSet:
         """Return some of the poses, the existing ones among them."""
         return replace(self, projectors=self.of(chosen), stages=self.stages[:, chosen])
 
-    def with_pose(self, i: int, other: "CandidateSet") -> "CandidateSet":
-        """Return these poses with the one of another set in the place of one."""
-        projectors, stages = list(self.projectors), self.stages.copy()
-        projectors[i], stages[:, i] = other.projectors[0], other.stages[:, 0]
-        return replace(self, projectors=tuple(projectors), stages=stages)
-
     def of(self, chosen: NDArray[np.int64]) -> tuple[PlannedProjector, ...]:
         """Return the projectors of some poses."""
         return tuple(self.projectors[i] for i in chosen)

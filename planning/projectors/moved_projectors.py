@@ -8,14 +8,12 @@ fitted to its samples, so fresh ones must confirm it.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from planning.model.devices.planned import PlannedProjector
 from planning.proofs.quotas import Quotas, RegionFloors, missed_shares
-from planning.proofs.selection import CandidateCover
 from planning.scene.lighting import lit_stages
 from planning.scene.limits.projector_limits import LIT
 from solvers import solve_max_coverage
@@ -42,69 +40,35 @@ _BUDGET = 1e8
 _FIRST_DRAW = 30
 
 
-@dataclass(frozen=True, eq=False)
-class ProjectorOffer:
-    """Known poses of projectors, and what gives others around them."""
-
-    source: CandidateSource
-    candidates: CandidateSet
-
-    @property
-    def known(self) -> tuple[PlannedProjector, ...]:
-        """The candidates."""
-        return self.candidates.projectors
-
-    @property
-    def cover(self) -> CandidateCover:
-        """What they light."""
-        return self.candidates.cover
-
-    def around(
-        self, device: PlannedProjector, n_lattice: int, scale: float
-    ) -> tuple[PlannedProjector, ...]:
-        """Return poses around one, every other one far from the object."""
-        return self.source.around((device,), n_lattice, scale, far=True)
-
-    def covers(
-        self, devices: Sequence[PlannedProjector], samples: NDArray[np.int64]
-    ) -> NDArray[np.bool_]:
-        """Return which of some samples each lights."""
-        some = self.candidates.samples.take(samples)
-        return lit_stages(self.candidates.scene, devices, some) == LIT
-
-    def confirms(self, devices: tuple[PlannedProjector, ...], draw: int) -> bool:
-        """Return whether they light enough of fresh samples."""
-        return confirms(self.candidates, devices, draw)
-
-
 def moved_projectors(
-    offer: ProjectorOffer, n_projectors: int, starts: int
+    source: CandidateSource, candidates: CandidateSet, n_projectors: int, starts: int
 ) -> tuple[PlannedProjector, ...]:
-    """Return poses that, with existing ones, cover what is required; () if none do.
+    """Return poses that, with existing ones, light what is required; () if none do.
 
     Args:
-        offer: Known poses, and what gives others.
+        source: Gives other poses.
+        candidates: Those that are known.
         n_projectors: One fewer than of these are needed.
         starts: Searches; each but the first begins where the best so far ended, with
             one of its poses anywhere.
     """
-    cover = offer.cover
+    cover, known = candidates.cover, candidates.projectors
     if not starts or n_projectors <= cover.n_existing:
         return ()
     rng = np.random.default_rng([cover.seed, n_projectors])
-    moves = _Moves(offer, cover, rng)
+    moves = _Moves(source, candidates, rng)
     chosen = solve_max_coverage(
         cover.problem, n_projectors, seed=cover.seed, budget=_BUDGET
     ).selected
     if len(chosen) < n_projectors:
         return ()
-    best, found = moves.moved(_Poses.of(offer, cover, chosen))
+    best, found = moves.moved(_Poses(candidates.of(chosen), cover.covers[:, chosen]))
     for _ in range(1, starts):
         if found or moves.missed(best.covered) > _HOPELESS:
             break
-        other = int(rng.integers(cover.n_existing, len(offer.known)))
+        other = int(rng.integers(cover.n_existing, len(known)))
         i = int(rng.integers(cover.n_existing, n_projectors))
-        kicked = best.with_pose(i, offer.known[other], cover.covers[:, other])
+        kicked = best.with_pose(i, known[other], cover.covers[:, other])
         poses, found = moves.moved(kicked)
         if moves.missed(poses.covered) <= moves.missed(best.covered):
             best = poses
@@ -117,13 +81,6 @@ class _Poses:
 
     devices: tuple[PlannedProjector, ...]
     covers: _Mask
-
-    @classmethod
-    def of(
-        cls, offer: ProjectorOffer, cover: CandidateCover, chosen: NDArray[np.int64]
-    ) -> "_Poses":
-        known = offer.known
-        return cls(tuple(known[i] for i in chosen), cover.covers[:, chosen])
 
     @property
     def covered(self) -> _Mask:
@@ -142,13 +99,9 @@ class _Moves:
     `rng` says in which order poses move, and how far off others are offered.
     """
 
-    offer: ProjectorOffer
-    cover: CandidateCover
+    source: CandidateSource
+    candidates: CandidateSet
     rng: np.random.Generator
-
-    @cached_property
-    def _reached(self) -> _Mask:
-        return np.any(self.cover.covers, axis=1)
 
     def moved(self, poses: _Poses) -> tuple[_Poses, bool]:
         """Return poses where none is better near by, and if fresh samples agree."""
@@ -156,7 +109,7 @@ class _Moves:
         while scale > _NEAREST:
             before = self.missed(poses.covered, _SPARE)
             for i in self.rng.permutation(len(poses.devices)):
-                if i >= self.cover.n_existing:
+                if i >= self.candidates.n_existing:
                     poses = self._better(poses, int(i), scale)
             missed = self.missed(poses.covered, _SPARE)
             if 0.0 < missed < before:
@@ -164,7 +117,7 @@ class _Moves:
             scale, short = scale * _NEARER, self.missed(poses.covered)
             if short <= 0.0:
                 attempt += 1
-                if self.offer.confirms(poses.devices, _FIRST_DRAW + attempt):
+                if confirms(self.candidates, poses.devices, _FIRST_DRAW + attempt):
                     return poses, True
             elif scale < _FAR and short > _HOPELESS:
                 break
@@ -175,17 +128,16 @@ class _Moves:
 
         Around where it is, or where one of the best known poses is.
         """
-        offer, known = self.offer, self.cover.covers
-        around = offer.around(
-            poses.devices[i], _N_LATTICE, scale * self.rng.uniform(0.5, 1.0)
-        )
+        candidates, known = self.candidates, self.candidates.lit
+        reach = scale * self.rng.uniform(0.5, 1.0)
+        around = self.source.around((poses.devices[i],), _N_LATTICE, reach, far=True)
         if not around:
             return poses
         rest = np.any(np.delete(poses.covers, i, axis=1), axis=1)
         lacking = np.flatnonzero(~rest)
         most = np.argsort(-known[lacking].sum(axis=0), kind="stable")[:_KNOWN]
-        offered = [*around, *(offer.known[k] for k in most)]
-        covers = np.hstack([offer.covers(around, lacking), known[lacking][:, most]])
+        offered = [*around, *candidates.of(most)]
+        covers = np.hstack([self._lit(around, lacking), known[lacking][:, most]])
         missed = []
         for column in covers.T:
             covered = rest.copy()
@@ -194,19 +146,24 @@ class _Moves:
         best = int(np.argmin(missed))
         if missed[best] >= self.missed(poses.covered, _SPARE):
             return poses
-        every = np.arange(len(rest))
-        return poses.with_pose(
-            i, offered[best], offer.covers((offered[best],), every)[:, 0]
-        )
+        lit = self._lit((offered[best],), np.arange(len(rest)))[:, 0]
+        return poses.with_pose(i, offered[best], lit)
+
+    def _lit(
+        self, devices: Sequence[PlannedProjector], samples: NDArray[np.int64]
+    ) -> _Mask:
+        """Return which of some samples (row) each projector (column) lights."""
+        some = self.candidates.samples.take(samples)
+        return lit_stages(self.candidates.scene, devices, some) == LIT
 
     def missed(self, covered: _Mask, spare: float = 0.0) -> float:
         """Return the share of what is required, and a little more, that isn't covered.
 
         What poses cover beside the known ones is required, too.
         """
-        cover = self.cover
+        cover, reached = self.candidates.cover, self.candidates.reached
         regions = cover.regions or RegionFloors.none(len(covered))
-        quotas = Quotas.of(regions, self._reached | covered, cover.share)
+        quotas = Quotas.of(regions, reached | covered, cover.share)
         quotas = replace(quotas, total=int(np.ceil((1.0 + spare) * quotas.total)))
         counts = quotas.regions.counts(covered)[:, None]
         return float(missed_shares(quotas, counts)[0])

@@ -24,7 +24,7 @@ from planning.scene.samples import Target
 from planning.scene.scene import Scene
 
 from .candidate_set import CandidateSource
-from .moved_projectors import ProjectorOffer, moved_projectors
+from .moved_projectors import moved_projectors
 from .projector_stage import ProjectorStage
 
 
@@ -78,8 +78,7 @@ def _better(
     fewer = min(stage.certificate.needed.count - 1, allowed)
     if better is not stage or bound.proof().lower_bound > fewer:
         return better
-    offer = ProjectorOffer(source, stage.candidates)
-    found = moved_projectors(offer, fewer, effort.starts)
+    found = moved_projectors(source, stage.candidates, fewer, effort.starts)
     return _with_more(stage, found) if found else stage
 
 

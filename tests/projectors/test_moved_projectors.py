@@ -6,6 +6,7 @@ seven for 0.865.
 """
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,11 +17,7 @@ from geometry.mesh.mesh import TriangleMesh
 from geometry.shapes.primitives import sphere
 from planning.projectors import moved_projectors as moved
 from planning.projectors.candidate_set import CandidateSet, CandidateSource
-from planning.projectors.moved_projectors import (
-    ProjectorOffer,
-    _Moves,
-    moved_projectors,
-)
+from planning.projectors.moved_projectors import _Moves, moved_projectors
 from planning.projectors.projector_stage import ProjectorStage
 from planning.projectors.proved_projectors import prove_fewest
 from planning.proofs.all_poses import Effort
@@ -62,28 +59,28 @@ def ball():
 def test_six_caps_are_found_where_the_lattice_needs_seven(ball):
     source, offer = ball
     assert select_fewest(offer.cover).needed == 7
-    found = moved_projectors(ProjectorOffer(source, offer), 6, starts=4)
+    found = moved_projectors(source, offer, 6, starts=4)
     assert len(found) == 6
     lit = CandidateSet.over(offer.scene, offer.samples, found).reached
     assert lit.sum() >= 0.865 * (offer.reached | lit).sum()
     axes = np.array([pose.world_from_device[:3, 2] for pose in found])
     apart = np.degrees(np.arccos(np.clip(axes @ axes.T, -1.0, 1.0)))
     assert np.min(apart + 360 * np.eye(6)) > 75.0
-    again = moved_projectors(ProjectorOffer(source, offer), 6, starts=4)
+    again = moved_projectors(source, offer, 6, starts=4)
     for one, other in zip(found, again, strict=True):
         np.testing.assert_array_equal(one.world_from_device, other.world_from_device)
 
 
 def test_what_no_poses_can_do_and_what_is_not_asked_for_is_not_found(ball):
     source, offer = ball
-    assert moved_projectors(ProjectorOffer(source, offer), 5, starts=2) == ()
-    assert moved_projectors(ProjectorOffer(source, offer), 6, starts=0) == ()
+    assert moved_projectors(source, offer, 5, starts=2) == ()
+    assert moved_projectors(source, offer, 6, starts=0) == ()
 
 
 def test_existing_poses_stay_and_are_not_returned(ball):
     source, offer = ball
     standing = replace(offer, n_existing=1)
-    found = moved_projectors(ProjectorOffer(source, standing), 6, starts=6)
+    found = moved_projectors(source, standing, 6, starts=6)
     assert len(found) == 5
     lit = CandidateSet.over(offer.scene, offer.samples, found).reached
     assert (lit | offer.lit[:, 0]).sum() >= 0.865 * offer.reached.sum()
@@ -98,7 +95,7 @@ def test_what_fresh_samples_deny_is_asked_for_again_and_given_up(ball, monkeypat
         return False
 
     monkeypatch.setattr(moved, "confirms", denied)
-    assert moved_projectors(ProjectorOffer(source, offer), 6, starts=1) == ()
+    assert moved_projectors(source, offer, 6, starts=1) == ()
     assert len(asked) > 1
     assert len({draw for _, draw in asked}) == len(asked)
 
@@ -160,7 +157,8 @@ def test_two_projectors_light_a_cross_for_which_candidates_need_three(monkeypatc
 def test_what_poses_cover_beside_the_known_ones_is_required_too():
     known = np.zeros((10, 1), dtype=bool)
     known[:4] = True
-    moves = _Moves(None, CandidateCover(known, 1.0), np.random.default_rng(0))
+    candidates = SimpleNamespace(cover=CandidateCover(known, 1.0), reached=known[:, 0])
+    moves = _Moves(None, candidates, np.random.default_rng(0))
     covered = np.arange(10) < 6
     assert moves.missed(covered) == 0.0
     covered[0] = False

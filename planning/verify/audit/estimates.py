@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import gammaln, ndtr
+from scipy.special import betaln, ndtr
 
 from geometry.arrays import Array, Mask
 
@@ -109,20 +109,18 @@ def chance_below(most: float, n: int, rank: int, n_claimed: int) -> float:
     """Return the chance that at most so many of n samples lie below one of the plan's.
 
     Below the `rank`-th, from 1, of its n_claimed, whatever the distribution, without
-    ties. Each order of all of them is as likely, so with m = n_claimed, r = rank::
+    ties: a beta-binomial number. Each order of all of them is as likely, so with
+    m = n_claimed, r = rank::
 
-        P(i lie below) = C(i + r - 1, i) C(n - i + m - r, n - i) / C(n + m, n)
+        P(i lie below) = C(n, i) B(i + r, n - i + m + 1 - r) / B(r, m + 1 - r)
 
     That is skewed where the rank is near an end, and wide where the plan's are few.
     """
+    # SciPy's own law is in `scipy.stats`, which takes as long to import as an audit.
     i = np.arange(int(np.clip(np.floor(most), -1, n)) + 1, dtype=np.float64)
-    ways = _log_choose(i + rank - 1, i)
-    ways = ways + _log_choose(n - i + n_claimed - rank, n - i)
-    return float(np.exp(ways - _log_choose(np.array(n + n_claimed), n)).sum())
-
-
-def _log_choose(n: Array, k: Array | int) -> Array:
-    return gammaln(n + 1.0) - gammaln(np.add(k, 1.0)) - gammaln(n - k + 1.0)
+    above = n_claimed + 1 - rank
+    ways = betaln(i + rank, n - i + above) - betaln(i + 1.0, n - i + 1.0)
+    return float(np.exp(ways - betaln(rank, above)).sum() / (n + 1))
 
 
 def _of_difference(p: Array, n: int, n_claimed: float) -> Array:
