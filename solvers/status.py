@@ -54,6 +54,10 @@ class WorkBudget:
         child._parent = self
         return child
 
+    def renew(self, units: float) -> None:
+        """Allow so much more work, that counts in no larger budget."""
+        self.units, self._parent = self.spent + units, None
+
     def spend(self, units: float) -> None:
         """Count work that was done."""
         self.spent += units

@@ -2,7 +2,9 @@
 
 First multipliers (``cell_multipliers``), one count after the other; then the search
 over multisets of cells (``cell_tuples``). Cut short, the bound is lower but true. Where
-a look finds cells that no search refutes, only smaller counts are searched.
+a look finds cells that no search refutes, only smaller counts are searched. What
+multisets of more than two cells refute is in the end given to multipliers again: who
+wants to follow the proof needs little else.
 """
 
 import enum
@@ -30,6 +32,9 @@ _MULTIPLIERS_SHARE = 0.75
 # A look for cells that survive: of so many poses at least, as of fewer multipliers soon
 # say all; multisets split at a time; and counted work, beside the budget.
 _LOOKED_FOR, _FEW, _LOOK = 2, 4, 2e8
+# Multisets that are soon followed, and work for multipliers of what larger ones refute,
+# in budgets.
+_FOLLOWED, _AGAIN = 2, 2.0
 
 
 class CellStatus(enum.Enum):
@@ -141,10 +146,13 @@ class _Proof:
         # Cells that are made count in both.
         self.store = CellStore(tree, share)
         rows = None if known is None else pack_rows(known)
+        self.share = share
         self.search = MultiplierSearch(self.whole, self.store, share, rows)
         self.lower, self.proof = min(least, count), "nothing is required of poses"
         if least:
             self.proof = "fewer were refuted before"
+        # Poses that multisets refuted last, and multipliers didn't.
+        self.by_multisets = 0
         self.survivor: NDArray[np.int64] | None = None
         # Cells in which one pose fewer than the count may be enough, whatever is tried.
         self.standing: NDArray[np.int64] | None = None
@@ -163,6 +171,8 @@ class _Proof:
             self.search.refute_most(most)
         while self.lower < self.count and self._refute(self.lower):
             pass
+        if self.by_multisets > _FOLLOWED:
+            self._again()
         if self.lower >= self.count:
             return self._answer(CellStatus.PROVED, float(self.count), self.proof)
         if self.survivor is not None:
@@ -197,8 +207,7 @@ class _Proof:
             self.survivor = self.standing
             return False
         if self.search.refute(n_poses):
-            self.lower = int(min(self.search.bound, self.count))
-            self.proof = "multipliers of the rows"
+            self._by_multipliers()
             return True
         budget = self.budget
         if n_poses > self.most_cells:
@@ -210,11 +219,21 @@ class _Proof:
             self.whole, self.store, n_poses, self.search.multipliers, budget
         )
         if answer.refuted:
-            self.lower = n_poses + 1
+            self.lower, self.by_multisets = n_poses + 1, n_poses
             self.proof = f"multisets of {n_poses} cells by exhaustion"
         elif answer.survivor is not None:
             self.survivor = self.store.names[answer.survivor]
         return answer.refuted
+
+    def _by_multipliers(self) -> None:
+        self.lower, self.by_multisets = int(min(self.search.bound, self.count)), 0
+        self.proof = "multipliers of the rows"
+
+    def _again(self) -> None:
+        """Let multipliers refute what multisets did, beside the budget."""
+        self.share.renew(_AGAIN * self.budget.units)
+        if self.search.refute(self.by_multisets):
+            self._by_multipliers()
 
     def _refute_none(self) -> bool:
         none = np.zeros((1, 0, self.store.rows.shape[1]), dtype=np.uint64)

@@ -515,6 +515,24 @@ def test_the_sphere_needs_a_tetrahedron(cap_trees, degrees, too_few, truth):
     assert "multisets of 3 cells" in answer.proof
 
 
+def test_what_multisets_of_three_refute_multipliers_get_work_for_again(
+    cap_trees, monkeypatch
+):
+    """Who follows the proof has multipliers alone."""
+    problem = CellProblem(np.ones(300), 285.0)
+    tree = cap_trees.SphereTree(cap_trees.spread(300), 60 * DEG, 5)
+    monkeypatch.setattr(cell_bound, "_MULTIPLIERS_SHARE", 1e-5)
+    monkeypatch.setattr(cell_bound, "_AGAIN", 0.0)
+    by_multisets = bound_count(problem, tree, 4, budget=1e9)
+    assert by_multisets.proof == "multisets of 3 cells by exhaustion"
+    assert by_multisets.by_multipliers < 4
+    monkeypatch.undo()
+    monkeypatch.setattr(cell_bound, "_MULTIPLIERS_SHARE", 1e-5)
+    again = bound_count(problem, tree, 4, budget=1e9)
+    assert again.lower_bound == by_multisets.lower_bound == again.by_multipliers == 4
+    assert again.proof == "multipliers of the rows"
+
+
 @pytest.mark.long
 def test_just_below_the_tetrahedron_four_caps_fail(cap_trees):
     points = cap_trees.spread(600)
