@@ -54,8 +54,10 @@ def audit_family(plan: RigPlan, cases: Sequence[AuditCase]) -> tuple[str, ...]:
     space = plan.requirements.workspace
     audit_ball(space, together, findings.at("requirements.workspace"))
     axes = plan.document.ring_axes
+    served = [case for m, case in enumerate(cases) if m not in left]
     if axes is not None and axes.taken == "centred":
-        audit_centred(cases, findings.at("ring_axes"))
+        # Members may have been left out before axes were chosen, or afterwards.
+        audit_centred((served, cases), findings.at("ring_axes"))
     for m, case in enumerate(cases):
         if m not in left:
             audit_served(case, findings.at(f"members.{m}"))

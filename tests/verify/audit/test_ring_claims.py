@@ -221,25 +221,42 @@ def test_false_claims_about_ring_axes_are_named(drum):
     assert str(ids[::-1]) in found
 
 
+def lit_at(coordinates):
+    """Return a case whose one projector lights points so far from its axis."""
+    light = SimpleNamespace(narrowest_ring=lambda points: 1.0)
+    record = SimpleNamespace(id="P1", rings=None)
+    return SimpleNamespace(
+        plan=SimpleNamespace(document=SimpleNamespace(projectors=[record])),
+        projectors=[
+            SimpleNamespace(light=light, ring_coordinate=lambda points: points[:, 0])
+        ],
+        samples=SimpleNamespace(points=np.outer(coordinates, [1.0, 0.0, 0.0])),
+        actual=SimpleNamespace(lit_by=np.ones((1, len(coordinates)), dtype=bool)),
+    )
+
+
 @pytest.mark.parametrize(
     ("n_lit", "n_far", "n_false"), [(500, 10, 0), (500, 11, 1), (9, 9, 0)]
 )
 def test_few_samples_far_out_dont_make_an_axis_stand_aside(n_lit, n_far, n_false):
     """Another draw may have missed them; of so few no ring is told at all."""
-    coordinates = np.where(np.arange(n_lit) < n_far, 1.2, 0.9)
-    light = SimpleNamespace(narrowest_ring=lambda _: 1.0)
-    record = SimpleNamespace(id="P1", rings=None)
-    case = SimpleNamespace(
-        plan=SimpleNamespace(document=SimpleNamespace(projectors=[record])),
-        projectors=[
-            SimpleNamespace(light=light, ring_coordinate=lambda _: coordinates)
-        ],
-        samples=SimpleNamespace(points=np.zeros((n_lit, 3))),
-        actual=SimpleNamespace(lit_by=np.ones((1, n_lit), dtype=bool)),
-    )
+    case = lit_at(np.where(np.arange(n_lit) < n_far, 1.2, 0.9))
     findings = AuditFindings()
-    audit_centred((case,), findings)
+    audit_centred(((case,),), findings)
     assert len(findings.failures) == n_false
+
+
+def test_an_axis_is_in_the_middle_of_one_group_of_members():
+    """Members left out may have been so before axes were chosen, or since."""
+    near, far = lit_at(np.full(500, 0.9)), lit_at(np.full(500, 1.2))
+    for groups, n_false in (
+        (((near,), (near, far)), 0),
+        (((far,), (near, far)), 1),
+        (((near, far), (near,)), 0),
+    ):
+        findings = AuditFindings()
+        audit_centred(groups, findings)
+        assert len(findings.failures) == n_false
 
 
 def test_a_run_that_was_cut_needs_no_report_on_rings(drum):

@@ -30,7 +30,7 @@ def audit_ring_axes(case: AuditCase, findings: AuditFindings) -> None:
     )
     # A member's light is a part of what the axis is in the middle of.
     if axes.taken == "centred" and not case.plan.of_member:
-        audit_centred((case,), findings)
+        audit_centred(((case,),), findings)
     if axes.other is None:
         return
     others, below = axes.other.projectors, findings.at("other")
@@ -53,29 +53,41 @@ def audit_ring_axes(case: AuditCase, findings: AuditFindings) -> None:
     case.estimator.audit("measured_m2", claimed, measured, below, part="target")
 
 
-def audit_centred(cases: Sequence[AuditCase], findings: AuditFindings) -> None:
+def audit_centred(
+    groups: Sequence[Sequence[AuditCase]], findings: AuditFindings
+) -> None:
     """Check that hardly narrower rings about other axes hold what is lit in all cases.
 
-    The cases are of the same projectors before several surfaces. One that keeps its
+    All cases are of the same projectors, each before a surface of its own; an axis is
+    in the middle of what is lit in the cases of one group. A projector that keeps its
     rings is left out.
     """
-    for p, record in enumerate(cases[0].plan.document.projectors):
+    first = groups[0][0]
+    for p, record in enumerate(first.plan.document.projectors):
         if record.rings is not None and record.rings.spacing == "kept":
             continue
-        projector = cases[0].projectors[p]
-        points = np.concatenate(
-            [case.samples.points[case.actual.lit_by[p]] for case in cases]
-        )
-        if len(points) <= _OUTSIDE:
-            continue
-        reach = float(np.sort(projector.ring_coordinate(points))[-1 - _OUTSIDE])
-        least = projector.light.narrowest_ring(points)
+        rings = [_rings_of(group, p) for group in groups]
+        reach, least = min(rings, key=lambda ring: ring[0] - (1.0 + _WIDER) * ring[1])
         findings.at(record.id).holds(
             reach <= (1.0 + _WIDER) * least,
             "world_from_ring",
             f"is claimed to be centred, but what is lit reaches out to a ring of "
             f"{reach:.5g}, and about another axis to one of {least:.5g}",
         )
+
+
+def _rings_of(cases: Sequence[AuditCase], p: int) -> tuple[float, float]:
+    """Return the ring that holds what a projector lights, and the narrowest there is.
+
+    Of few points nothing is said: 0 and 0.
+    """
+    projector = cases[0].projectors[p]
+    lit = [case.samples.points[case.actual.lit_by[p]] for case in cases]
+    points = np.concatenate(lit)
+    if len(points) <= _OUTSIDE:
+        return 0.0, 0.0
+    reach = np.sort(projector.ring_coordinate(points))[-1 - _OUTSIDE]
+    return float(reach), projector.light.narrowest_ring(points)
 
 
 def _measured(case: AuditCase, projectors: Sequence[AuditProjector]) -> Mask:
