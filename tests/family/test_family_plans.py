@@ -17,6 +17,7 @@ from planning.cli.output_folder import exchanged
 from planning.model.errors import InputError, PlanFileError
 from planning.report.summary.shortfall import shortfalls
 from planning.steps.family.family_plan import family_plan, met, with_members
+from planning.verify import family as family_audit
 from planning.verify.audit.audit import audit_plan
 from planning.verify.audit.audit_case import examine
 from planning.verify.family import audit_family
@@ -371,6 +372,22 @@ def test_a_ring_that_lights_a_served_member_is_not_idle(both):
     mine = f"members.{one}.P1.rings.left_out"
     assert not any(mine in line for line in audit_family(aside, cases))
     assert not any("left_out: 1" in m for m in audit_plan(forged.members[one]).failures)
+
+
+def test_centred_axes_are_in_the_middle_of_what_members_served_are_lit_of(
+    wide, monkeypatch
+):
+    """Or of all, where one was left out after axes were chosen."""
+    asked, cases = [], _cases(wide)
+    axes = wide.document.ring_axes.changed(taken="centred")
+    told = RigPlan(
+        wide.document.changed(ring_axes=axes), wide.surface, members=wide.members
+    )
+    monkeypatch.setattr(
+        family_audit, "audit_centred", lambda groups, _: asked.extend(groups)
+    )
+    audit_family(told, cases)
+    assert [list(group) for group in asked] == [[cases[0], cases[2]], list(cases)]
 
 
 def test_rings_are_spaced_for_those_served_and_may_be_wide_on_others(wide):
