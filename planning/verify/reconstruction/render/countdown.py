@@ -12,11 +12,11 @@ _VIEWS_A_PAIR = 1.4
 
 
 def countdown(
-    say: Callable[[str], None], *, n_cameras: int, threads: int
+    say: Callable[[str], None], *, n_views: int, threads: int
 ) -> Callable[[int, int], None]:
     """Return what is to be called with the pairs done and their total.
 
-    That is 0 when the views have been cast: how long this took tells what the pairs
+    That is 0 when so many views have been cast: how long this took tells what the pairs
     will take, on whatever machine.
     """
     begin = time.monotonic()
@@ -25,7 +25,7 @@ def countdown(
         nonlocal begin
         spent = time.monotonic() - begin
         if done == 0:
-            left = math.ceil(_VIEWS_A_PAIR * spent * total / n_cameras)
+            left = math.ceil(_VIEWS_A_PAIR * spent * total / n_views)
             begin = time.monotonic()
             say(f"{total} pairs on {count_words(threads, 'thread')}, about {left} s")
             return

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Generator
+from concurrent.futures import Future, wait
 from contextlib import contextmanager
 from threading import Lock
 
@@ -90,7 +91,8 @@ def decode_rendered(
 
     Patterns are drawn for the plan, which is also what the decoder knows of poses and
     optics, unless something else is `believed`. `develop` is called in any thread with
-    the frames of each pair, and returns those that are decoded.
+    the frames of each pair, and returns those that are decoded. Views of cameras are
+    kept until their pairs are done, and take most of the memory.
     """
     scene = RenderedScene(plan, truth, photometry)
     known = dict((believed or plan).pairs())
@@ -106,7 +108,7 @@ def decode_rendered(
     def measure(pair: PairIndex) -> Decoded:
         p, c = pair
         with spent.on("render"):
-            one, seen = shown(p, c), views[c]
+            one, seen = shown(p, c), views[c].result()
             if seen is None or one is None:
                 return Decoded.nothing()
             others = [other for k in beside[p] if (other := shown(k, c)) is not None]
@@ -120,11 +122,26 @@ def decode_rendered(
         with spent.on("decode"):
             return decode_pair(frames, one.patterns, known[pair], plan.limits)
 
+    cameras = sorted({c for _, c in known})
+    views: dict[int, Future[RenderedView | None]] = {}
+    jobs: dict[PairIndex, Future[Decoded]] = {}
+    decoded: Pairs = []
     with abandonable(threads) as pool:
-        views = list(pool.map(look, range(len(plan.cameras))))
-    if progress is not None:
-        progress(0, len(known))
-    return over_pairs(plan, measure, threads=threads, progress=progress)
+        for k, c in enumerate(cameras):
+            # No thread waits for the next view while another casts it.
+            for ahead in cameras[len(views) : k + threads]:
+                views[ahead] = pool.submit(look, ahead)
+            jobs |= {pair: pool.submit(measure, pair) for pair in known if pair[1] == c}
+        if progress is not None:
+            wait([views[c] for c in cameras[:threads]])
+            progress(0, len(known))
+        for c in cameras:
+            for pair in (pair for pair in known if pair[1] == c):
+                decoded.append((pair, jobs.pop(pair).result()))
+                if progress is not None:
+                    progress(len(decoded), len(known))
+            del views[c]
+    return decoded
 
 
 def decode_pair(
