@@ -177,6 +177,17 @@ def test_cameras_of_heads_that_cross_measure_with_no_projector_but_the_plans(few
     assert audit_plan(plan).failures == ()
 
 
+def test_other_heads_reach_nothing_with_the_projectors_of_heads_that_cross(few):
+    """Hardly a pair of one head is 16.5 degrees apart; a camera elsewhere would be."""
+    limits = {"max_sigma_mm": 1.0, "min_angle_deg": 16.5}
+    rig = head_rig(head={"cross": True}, limits=limits)
+    plan = planned(rig, max_heads=1, pattern="dense")
+    target, proof = plan.coverage.target, plan.document.certificates.cameras
+    assert target.reachable_by_cameras_m2 < 0.2 * target.lit_m2
+    asked = plan.requirements.coverage * target.reachable_by_cameras_m2
+    assert proof.required_m2 == pytest.approx(asked, rel=0.15)
+
+
 def test_a_pair_across_heads_measures_nothing(plan, handmade):
     """Without names of stations more is measured than was claimed, or as much."""
 

@@ -57,11 +57,14 @@ def stages_of(
     samples = LitSamples.of(lamps, target.take(bright), lit[bright])
     views = CandidateViews(scene, cameras)
     seen = views.on(samples.target)
-    # One without a station would measure with projectors of the reference set, too.
-    planned_lit = lit[bright, :n_projectors]
-    own = LitSamples.of(lamps[:n_projectors], samples.target, planned_lit)
+    # One without a station would measure with projectors of every station, and with one
+    # that has none every camera would.
     measured = np.zeros((len(bright), len(cameras)), dtype=bool)
-    for stationed, by in ((True, samples), (False, own)):
+    for stationed in {bool(camera.station) for camera in cameras}:
+        here = [k for k, lamp in enumerate(lamps) if bool(lamp.station) is stationed]
+        by = LitSamples.of(
+            [lamps[k] for k in here], samples.target, lit[np.ix_(bright, here)]
+        )
         some = [k for k, c in enumerate(cameras) if bool(c.station) is stationed]
         those, theirs = [cameras[k] for k in some], [seen[k] for k in some]
         measured[:, some] = measured_by(scene, those, by, theirs)
