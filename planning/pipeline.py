@@ -289,17 +289,18 @@ def _devices_sought(
 ) -> Search[PartialPlan, Draft]:
     """Devices, rings and proofs; one device more where fresh samples fall short.
 
-    Where these denied as many cameras, no fewer are sought for the same projectors and
-    axes: they would be found, and denied, without end.
+    Fewer cameras are sought once for the same projectors and axes: where fresh samples
+    denied those that were found, they would be found, and denied, without end.
     """
     larger: PartialPlan | None = _first_plan(request, clock)
-    denied = False
+    sought = False
     while larger is not None:
         yield larger, False
         partial = polished(larger, clock)
         yield partial, False
         partial = bounded_cameras(partial, clock)
-        if not denied and (larger := with_fewer_cameras(partial, clock)):
+        if not sought and (larger := with_fewer_cameras(partial, clock)):
+            sought = True
             continue
         draft = yield partial, True
         assert draft is not None
@@ -307,7 +308,7 @@ def _devices_sought(
         larger = larger or one_more_for_losses(partial, draft, clock)
         larger = larger or one_device_more(partial, draft, clock)
         same = larger and (larger.projectors, larger.axes)
-        denied = same == (partial.projectors, partial.axes)
+        sought = same == (partial.projectors, partial.axes)
 
 
 def _first_plan(request: PlanRequest, clock: Stopwatch) -> PartialPlan:

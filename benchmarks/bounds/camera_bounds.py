@@ -30,14 +30,16 @@ from planning import load_rig
 from planning.cameras.camera_cover import camera_candidate_views
 from planning.cameras.camera_stage import place_cameras
 from planning.cameras.priced_cameras import fewer_cameras, has_room
-from planning.cameras.proved_cameras import bound_stage
+from planning.cameras.proved_cameras import CameraStage, bound_stage
 from planning.model.devices.planned import PlannedCamera
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.progress import Stopwatch
 from planning.projectors.projector_poses import widen_margins
+from planning.proofs.all_poses import Effort
 from planning.proofs.camera_bound import DEFAULT, PROVE
 from planning.report.partial_plan import PlanRequest
 from planning.rig.wishes import Wishes
+from planning.scene.scene import Scene
 from planning.steps.prepare import prepared
 from planning.steps.stages import first_projectors
 
@@ -102,18 +104,13 @@ def _case(
         return len(projectors), "nothing measured", 0
     effort = PROVE if given.prove else DEFAULT
     first, words = stage.certificate.needed.count, ""
-    while True:
-        begin = time.process_time()
-        stage = bound_stage(ready.scene, stage, (camera.device,), effort)
-        seconds = time.process_time() - begin
-        begin = time.process_time()
-        fewer = None
-        if has_room(stage):
-            fewer = fewer_cameras(scene, projectors, stage, effort.starts)
-        if fewer is None:
-            break
-        stage = fewer
+    stage, seconds = _bounded(ready.scene, stage, camera, effort)
+    begin = time.process_time()
+    if has_room(stage) and (
+        fewer := fewer_cameras(scene, projectors, stage, effort.starts)
+    ):
         words = f"{first} -> ({time.process_time() - begin:.1f} s) "
+        stage, seconds = _bounded(ready.scene, fewer, camera, effort)
     proof = stage.certificate
     needed, bound = proof.needed, proof.continuous
     assert bound is not None
@@ -126,6 +123,15 @@ def _case(
         f"({bound.proof.split(';')[0]}, {seconds:.1f} s)",
         count - least,
     )
+
+
+def _bounded(
+    scene: Scene, stage: CameraStage, camera: PlannedCamera, effort: Effort
+) -> tuple[CameraStage, float]:
+    """Return a stage with its bound, and processor seconds."""
+    begin = time.process_time()
+    stage = bound_stage(scene, stage, (camera.device,), effort)
+    return stage, time.process_time() - begin
 
 
 def _arguments() -> argparse.Namespace:

@@ -1,4 +1,4 @@
-"""What cameras see is kept no longer than their pairs take; it is most of the memory."""
+"""What cameras see is kept until their pairs are done: it is most of the memory."""
 
 import weakref
 
