@@ -62,7 +62,7 @@ def certified(
     """
     others = marginals(cover, selection)
     if by_count is not None:
-        reported = {n: by_count[n] for n in others.by_count if n in by_count}
+        reported = _of_route(cover, by_count, others.by_count, len(selection.chosen))
         covered = {
             n: (cover.n_covered(c), others.n_covered[n][1]) for n, c in reported.items()
         }
@@ -108,6 +108,25 @@ def certified(
     given = {key: value for key, value in extras.items() if value is not None}
     given |= bodies_left_out(() if among is None else among.devices)
     return others.by_count, proof.changed(**given)
+
+
+def _of_route(
+    cover: CandidateCover, route: _ByCount, best: _ByCount, taken: int
+) -> _ByCount:
+    """Return the candidates of a route for each count that it passed.
+
+    A route goes by what floors of regions lack, so more of it may cover less than
+    fewer do: of such a number, but for the one taken, the best that were found.
+    """
+    reported: dict[int, NDArray[np.int64]] = {}
+    most = 0
+    for n in sorted(best.keys() & route.keys()):
+        choice = (route[n],)
+        if n != taken and cover.n_covered(route[n]) < most:
+            choice = route[n], best[n]
+        reported[n] = max(choice, key=cover.n_covered)
+        most = max(most, cover.n_covered(reported[n]))
+    return reported
 
 
 def bodies_left_out(candidates: Sequence[Device]) -> dict[str, str]:

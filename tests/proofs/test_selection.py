@@ -103,3 +103,17 @@ def test_a_certificate_says_what_the_total_takes_without_floors(dark, total):
         assert proof.candidates.for_total == total
     plain = CandidateCover(covers, 0.9)
     assert certified(plain, select_fewest(plain), 1.0)[1].candidates.for_total is None
+
+
+def test_no_more_of_a_route_are_told_to_cover_less_than_fewer():
+    """Its pair goes by floors, and covers half as much as its first does alone."""
+    covers = np.zeros((100, 5), dtype=bool)
+    covers[:60, 0] = covers[60:80, 1] = covers[80:95, 2] = covers[95:, 3] = True
+    covers[60:65, 4] = True
+    cover = CandidateCover(covers, 1.0)
+    passed = {1: [0], 2: [1, 4], 3: [0, 1, 2], 4: [0, 1, 2, 3]}
+    route = {n: np.array(of) for n, of in passed.items()}
+    others, proof = certified(cover, select_fewest(cover), 1.0, None, route)
+    areas = {row.count: row.value_m2 for row in proof.by_count}
+    assert [areas[n] for n in (1, 2, 3)] == [60.0, 80.0, 95.0]
+    assert [others[n].tolist() for n in (1, 2, 3)] == [[0], [0, 1], [0, 1, 2]]

@@ -4,6 +4,7 @@ import copy
 import dataclasses
 import json
 import math
+from functools import partial
 
 import numpy as np
 import pytest
@@ -836,9 +837,16 @@ def test_an_empty_target_breaks_the_plan(handmade):
 
 def test_floors_of_regions_may_cost_area_from_one_number_to_the_next(handmade):
     """One camera may measure more than the two that measure enough of each region."""
-    change = _at("marginal", 2, "measured_target_m2", 0.009)
-    found = failures(handmade.tampered(handmade.build_plan(), change))
-    assert not any("falls from" in failure for failure in found)
+
+    def fewer_measure_more(document: dict, needed: int) -> None:
+        _at("marginal", 2, "measured_target_m2", 0.009)(document)
+        # Also where more are needed than there may be.
+        document["certificates"]["cameras"]["needed"]["count"] = needed
+
+    for needed in (2, 5):
+        change = partial(fewer_measure_more, needed=needed)
+        found = failures(handmade.tampered(handmade.build_plan(), change))
+        assert not any("falls from" in failure for failure in found)
 
 
 def test_an_unmet_requirement_is_no_false_claim(handmade):

@@ -65,8 +65,9 @@ def audit_tables(case: AuditCase, findings: AuditFindings) -> None:
         table = marginal_of(case.plan, kind.name, "target")
         floored = case.plan.requirements.region_coverage > 0.0
         for (fewer, less), (number, more) in pairwise(table):
-            # Those that meet the floors of regions may cover less in all.
-            if floored and fewer < kind.proof.needed.count <= number:
+            # Those chosen to meet the floors of regions may cover less in all.
+            chosen = fewer < kind.proof.needed.count <= number
+            if floored and (chosen or number == kind.proof.count):
                 continue
             findings.holds(
                 more >= less - slack,
