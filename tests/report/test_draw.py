@@ -229,6 +229,15 @@ def test_a_fitted_view_holds_every_point_and_is_tight():
     assert step == pytest.approx([0.0, -0.5 / view.m_per_px])
 
 
+def test_captions_above_and_below_have_a_margin_of_their_own():
+    tall = np.array([[0.0, 0.0, 0.0], [0.2, 0.0, 1.0], [0.1, 0.3, 0.4]])
+    view = fitted(tall, (1, 0, 0), (0, 0, 1), (400, 300), margin_px=(20, 60))
+    pixels = view.project(tall)
+    assert np.ptp(pixels[:, 1]) == pytest.approx(300 - 2 * 60)
+    assert pixels[:, 1].min() == pytest.approx(60)
+    assert pixels[:, 0].min() >= 20
+
+
 def test_a_sphere_is_a_disc_of_its_own_size():
     ball = sphere(0.1, (3.0, -2.0, 5.0))
     view = PictureView(ball.centre, *facing((1, -1, 1), (0, 0, 1)), (240, 200), 0.001)

@@ -157,7 +157,7 @@ class Panel:
         """Name the panel in its upper left corner; labels keep off the name."""
         spot = (14 * SUPERSAMPLING, 10 * SUPERSAMPLING)
         box = self._draw.textbbox(spot, text, font=font(15.0))
-        # Lines of a room may run behind it.
+        # Lines of a room or of light may run behind it.
         self._draw.rectangle(box, fill=BACKGROUND)
         self._draw.text(spot, text, PALE, font=font(15.0))
         self.taken.append(box)

@@ -90,13 +90,16 @@ def fitted(
     up: Sequence[float] | NDArray[np.float64],
     size: tuple[int, int],
     *,
-    margin_px: float,
+    margin_px: float | tuple[float, float],
 ) -> PictureView:
-    """Return the view from a direction that holds all points, as large as can be."""
+    """Return the view from a direction that holds all points, as large as can be.
+
+    The margin is at every side, or at the sides and above and below.
+    """
     right, upward = facing(direction, up)
     plane = points @ np.stack([right, upward], axis=1)
     low, high = plane.min(axis=0), plane.max(axis=0)
-    room = np.maximum(np.array(size) - 2.0 * margin_px, 1.0)
+    room = np.maximum(np.array(size) - 2.0 * np.array(margin_px), 1.0)
     m_per_px = float(np.max((high - low) / room))
     back = np.cross(right, upward)
     middle = 0.5 * (low + high)

@@ -39,6 +39,8 @@ from .shader import Shader
 
 _DEVICES: dict[str, Colour] = {"projector": (200, 80, 0), "camera": (0, 90, 160)}
 _MIN_SIZE = (800, 500)
+# Room for a caption above an object, and for a scale bar below it.
+_CAPTION = 40
 _LONGEST = 24
 
 
@@ -117,9 +119,9 @@ def _devices_panel(
     panel.keep_clear(shader.points)
     draw_zones(panel, zones)
     draw_obstacles(panel, solids, direction)
-    panel.heading(heading)
     for figure in figures:
         _mark_device(panel, figure)
+    panel.heading(heading)
     panel.scale_bar(size=14.0)
     panel.axes(size=15.0)
     for figure in figures:
@@ -187,8 +189,9 @@ def _close_up(
         spots.append(region_spots(plan, shader.caster, back))
     part = (size[0] // len(directions), size[1] - foot)
     for k, direction in enumerate(directions):
-        margin = 0.11 * min(part)
-        view = fitted(shader.points, direction, up, part, margin_px=margin)
+        aside = 0.11 * min(part)
+        margins = aside, max(aside, _CAPTION * SUPERSAMPLING)
+        view = fitted(shader.points, direction, up, part, margin_px=margins)
         panel = Panel(shader.shade(view), view)
         panel.axes(size=12.0)
         panel.scale_bar(size=13.0)
