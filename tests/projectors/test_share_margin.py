@@ -25,8 +25,8 @@ def random_margins(seed, n=60, m=9):
 
 def test_margin_at_share_is_that_of_the_last_sample_that_counts():
     margin = np.array([[0.1, -np.inf], [0.2, 0.3], [-np.inf, -np.inf], [0.05, 0.2]])
-    found = [margin_at_share(margin, required) for required in (1, 2, 3, 4, 5)]
-    assert found == [0.3, 0.2, 0.1, -np.inf, -np.inf]
+    found = [margin_at_share(margin, required) for required in range(6)]
+    assert found == [np.inf, 0.3, 0.2, 0.1, -np.inf, -np.inf]
 
 
 def total(n, required):
