@@ -35,6 +35,7 @@ _LOOKED_FOR, _FEW, _LOOK = 2, 4, 2e8
 # Multisets that are soon followed, and work for multipliers of what larger ones refute,
 # in budgets.
 _FOLLOWED, _AGAIN = 2, 2.0
+_BY_MULTIPLIERS = "multipliers of the rows"
 
 
 class CellStatus(enum.Enum):
@@ -207,7 +208,8 @@ class _Proof:
             self.survivor = self.standing
             return False
         if self.search.refute(n_poses):
-            self._by_multipliers()
+            self.lower, self.by_multisets = int(min(self.search.bound, self.count)), 0
+            self.proof = _BY_MULTIPLIERS
             return True
         budget = self.budget
         if n_poses > self.most_cells:
@@ -225,15 +227,14 @@ class _Proof:
             self.survivor = self.store.names[answer.survivor]
         return answer.refuted
 
-    def _by_multipliers(self) -> None:
-        self.lower, self.by_multisets = int(min(self.search.bound, self.count)), 0
-        self.proof = "multipliers of the rows"
-
     def _again(self) -> None:
         """Let multipliers refute what multisets did, beside the budget."""
+        ended = self.search.out_of_work
         self.share.renew(_AGAIN * self.budget.units)
         if self.search.refute(self.by_multisets):
-            self._by_multipliers()
+            self.proof = _BY_MULTIPLIERS
+        # What ended the search is what ended it before.
+        self.search.out_of_work = ended
 
     def _refute_none(self) -> bool:
         none = np.zeros((1, 0, self.store.rows.shape[1]), dtype=np.uint64)
