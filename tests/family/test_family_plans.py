@@ -1,6 +1,7 @@
 """One rig for several meshes: plans whose counts are known, and what may be said."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -103,6 +104,23 @@ def test_plates_that_face_apart_take_twice_what_one_takes(both, rig, few):
         assert (told.lower_bound, told.needed, told.hardest.count) == (2, 2, 1)
         # Each alone proves no more than what it takes for itself.
         assert told.over_poses.lower_bound == 1
+
+
+def test_what_helps_is_for_all_members_not_for_the_first(both):
+    """Each alone takes one device and misses another share: all take two, and less."""
+    shares, members = (0.8, 0.7), []
+    for member, share in zip(both.members, shares, strict=True):
+        target = member.coverage.target
+        dark = target.changed(lit_m2=share * target.reachable_by_projectors_m2)
+        coverage = member.coverage.changed(target=dark)
+        asked = replace(member.requirements, max_projectors=1)
+        changed = member.document.changed(coverage=coverage, requirements=asked)
+        members.append(replace(member, document=changed))
+    lines = shortfalls(replace(both, members=tuple(members)))
+    assert len(lines) == 2
+    for line in lines:
+        assert "--dominant-coverage 0.70 accepts this plan" in line
+        assert "--max-projectors 2 (over candidates at least 2)" in line
 
 
 @pytest.mark.long

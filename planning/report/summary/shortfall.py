@@ -1,11 +1,11 @@
 """Which requirements a plan misses, why, and what would help."""
 
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from planning.model.document.certificates import Certificate
 from planning.model.document.coverage_records import Coverage, Relaxation
+from planning.model.document.family_records import FamilyCount, FamilyRecord
 from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
 from planning.model.requirements import Requirements
@@ -17,6 +17,7 @@ from planning.report.tolerance.survival_lines import (
     pairs_words,
 )
 
+from .accepted import accepting_all
 from .cause_words import (
     areas_line,
     causes_left,
@@ -27,9 +28,6 @@ from .cause_words import (
 )
 from .devices.device_lines import used_up
 from .region_lines import floor_shortfalls
-
-# The option that accepts one requirement that a plan misses.
-_ACCEPTS = re.compile(r"(--\S+ [\d.]+) accepts (?:this plan|what there is)$")
 
 
 @dataclass(frozen=True)
@@ -62,37 +60,22 @@ def shortfalls(plan: RigPlan) -> tuple[str, ...]:
 
 def missing(plan: RigPlan) -> Iterator[Shortfall]:
     """Yield the requirements that a plan misses, of a family member by member."""
+    family, every = plan.document.family, list[Shortfall]()
     for name, member in plan.served:
-        for one in missing(member):
+        for one in _missing(member, family):
             figure, missed = f"{name}: {one.figure}", f"{name}: {one.missed}"
-            yield replace(one, figure=figure, missed=missed)
-    if plan.members:
-        return
-    every = list(_missing(plan))
-    together = _accepting_all(every)
-    for one in every:
-        # Where several are missed, what accepts one doesn't accept the plan.
-        helps = (_ACCEPTS.sub(together, text) for text in one.helps)
-        yield replace(one, helps=tuple(helps))
+            every.append(replace(one, figure=figure, missed=missed))
+    if not plan.members:
+        every = list(_missing(plan))
+    helps = accepting_all([one.helps for one in every])
+    for one, texts in zip(every, helps, strict=True):
+        yield replace(one, helps=texts)
 
 
-def _accepting_all(every: list[Shortfall]) -> str:
-    """Return what stands for an option that accepts one shortfall, as a pattern.
-
-    All such options, if each shortfall has one.
-    """
-    found = [[m[1] for m in map(_ACCEPTS.search, one.helps) if m] for one in every]
-    options = list(dict.fromkeys(option for some in found for option in some))
-    if len(every) == 1 or not all(found):
-        return r"\g<0>" if len(every) == 1 else r"\1 asks for no more"
-    together = "accepts" if len(options) == 1 else "together accept"
-    return f"{' '.join(options)} {together} this plan"
-
-
-def _missing(plan: RigPlan) -> Iterator[Shortfall]:
+def _missing(plan: RigPlan, family: FamilyRecord | None = None) -> Iterator[Shortfall]:
     required, check = plan.requirements, plan.document.reconstruction
     yield from _reachable(plan.document, required)
-    yield from _covered(plan.document, required)
+    yield from _covered(plan.document, required, family)
     yield from _floors(plan)
     yield from _surviving(plan)
     yield from _robust(plan.document, required)
@@ -223,7 +206,9 @@ def _unmeasurable(document: PlanDocument) -> str:
     return f": {areas_line(causes)}" if causes else ""
 
 
-def _covered(document: PlanDocument, requirements: Requirements) -> Iterator[Shortfall]:
+def _covered(
+    document: PlanDocument, requirements: Requirements, family: FamilyRecord | None
+) -> Iterator[Shortfall]:
     areas, proofs = document.coverage.target, document.certificates
     lit = "" if requirements.pattern == "none" else "lit and "
     for kind, proof, covered, whole, required, (deed, done) in (
@@ -256,7 +241,7 @@ def _covered(document: PlanDocument, requirements: Requirements) -> Iterator[Sho
             f"{percent(required)} is required; {area_words(whole - covered)} of "
             f"{area_words(whole)} are left{_bodies(document.coverage, proof)}."
             f"{causes_left(kind, document)}",
-            _remedies(kind, document, share),
+            _remedies(kind, document, share, family),
         )
 
 
@@ -279,9 +264,14 @@ def _bodies(coverage: Coverage, proof: Certificate) -> str:
     return f" ({', '.join(phrases)})" if phrases else ""
 
 
-def _remedies(kind: str, document: PlanDocument, share: float) -> tuple[str, ...]:
+def _remedies(
+    kind: str, document: PlanDocument, share: float, family: FamilyRecord | None
+) -> tuple[str, ...]:
     proof: Certificate = getattr(document.certificates, kind)
     needed, requirements = proof.needed, document.requirements
+    # What a member takes alone needn't do for all.
+    of_all: FamilyCount | None = None if family is None else getattr(family, kind)
+    enough = needed.count if of_all is None else of_all.needed
     evaluation, allowed = document.evaluation, getattr(requirements, f"max_{kind}")
     option = "dominant-coverage" if kind == "projectors" else "coverage"
     accept = f"--{option} {rounded_down(share)} accepts this plan"
@@ -290,7 +280,7 @@ def _remedies(kind: str, document: PlanDocument, share: float) -> tuple[str, ...
         more = f"`plan --fixed {evaluation.path}` keeps these and seeks more {kind}"
         return (more, f"or {accept}") if share > 0.0 else (more,)
     if gone := used_up(document, kind.removesuffix("s")):
-        of_any = f"with any number of each {needed.count} would do"
+        of_any = f"with any number of each {enough} would do"
         return (f"more of {gone} in stock: {of_any}", f"or {accept}")
     told = document.stations
     count = None if told is None else told.count
@@ -299,9 +289,12 @@ def _remedies(kind: str, document: PlanDocument, share: float) -> tuple[str, ...
     if count is not None and (count.needed or 0) > count.count:
         return f"--max-heads {count.needed} would do", f"or {accept}"
     # Where bodies are in the way, more devices may be no help.
-    in_vain = needed.count <= proof.but_for_bodies
-    if allowed is None or needed.count <= allowed or in_vain:
+    in_vain = enough <= proof.but_for_bodies
+    if allowed is None or enough <= allowed or in_vain:
         return (accept,)
+    if of_all is not None:
+        least = f"over candidates at least {of_all.lower_bound}"
+        return f"--max-{kind} {enough} ({least})", f"or {accept}"
     bound = f"{proof.candidates.status} over the candidates"
     if needed.lower_bound != needed.count:
         bound = f"at least {needed.lower_bound} {bound}"
