@@ -16,6 +16,7 @@ from planning.cli.lines.comparison import compared
 from planning.cli.main import commands
 from planning.cli.output_folder import exchanged
 from planning.model.errors import InputError, PlanFileError
+from planning.report.summary.proof_lines import proof_lines
 from planning.report.summary.shortfall import shortfalls
 from planning.steps.family.family_plan import family_plan, met, with_members
 from planning.verify import family as family_audit
@@ -249,6 +250,19 @@ def test_a_family_is_compared_by_its_worst_member_and_says_of_how_many(both):
     assert both.document.own_mesh == both.document.meshes[worst]
     other = _with_family(both, worst=1 - worst).document
     assert other.own_mesh == both.document.meshes[1 - worst]
+
+
+def test_what_bounds_a_family_is_of_all_members_wherever_it_is_told(both):
+    """Each member alone takes one device, both take two."""
+    rows = {row.what: row for row in compared(both, both.members[0])}
+    for kind in ("projectors", "cameras"):
+        told = rows[f"{kind}, at least: candidates"]
+        assert (told.first, told.second) == ("2", "1")
+        assert rows[f"{kind}, at least: all poses"].first == "1"
+    first, *rest = filter(None, proof_lines(both))
+    assert first.startswith("FAMILY   2 projectors; over candidates at least 2")
+    assert rest[1].endswith("alone, the worst member")
+    assert not any("FAMILY" in line for line in proof_lines(both.members[0]))
 
 
 def test_members_have_the_same_rig_and_each_its_own_claims(both):

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from planning.model.document.certificates import Certificate
+from planning.model.document.certificates import ContinuousProof, NeededCount
+from planning.model.document.family_records import FamilyCount, MemberBound
 from planning.model.plan import RigPlan
 from planning.model.words import share_words
 from planning.report.summary.check_lines import missing_words
@@ -130,15 +131,25 @@ def _devices(plan: RigPlan) -> Iterator[tuple[str, str]]:
         return
     if document.evaluation is not None:
         return
+    if (family := document.family) is not None:
+        # The certificates are of its worst member alone.
+        yield from _bounds(
+            "projectors", family.projectors, family.projectors.over_poses
+        )
+        yield from _bounds("cameras", family.cameras, family.cameras.over_poses)
+        return
     proofs = document.certificates
     for kind, proof in (("projectors", proofs.projectors), ("cameras", proofs.cameras)):
         if proof is not None:
-            yield from _proof(kind, proof)
+            yield from _bounds(kind, proof.needed, proof.continuous)
 
 
-def _proof(kind: str, proof: Certificate) -> Iterator[tuple[str, str]]:
-    everywhere = proof.continuous
-    yield f"{kind}, at least: candidates", str(proof.needed.lower_bound)
+def _bounds(
+    kind: str,
+    candidates: NeededCount | FamilyCount,
+    everywhere: ContinuousProof | MemberBound | None,
+) -> Iterator[tuple[str, str]]:
+    yield f"{kind}, at least: candidates", str(candidates.lower_bound)
     if everywhere is not None:
         yield f"{kind}, at least: all poses", str(everywhere.lower_bound)
 

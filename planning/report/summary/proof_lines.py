@@ -8,6 +8,7 @@ from planning.report.tolerance.survival_lines import surviving_proofs
 from planning.scene.lights import light_of
 
 from .devices.station_lines import fewest_words
+from .family_lines import family_bounds
 
 _EXCLUDED = {
     "projector_beam": "lie outside the beam",
@@ -45,6 +46,7 @@ def proof_lines(plan: RigPlan) -> list[str]:
     poses = light_of(plan.projectors[0].device).bounded_over
     return [
         "",
+        *_of_family(plan),
         _proof(plan, "projector", requirements.dominant_coverage, "light"),
         _continuous(proofs.projectors, poses + _of_any(plan, "projector")),
         _proof(plan, "camera", requirements.coverage, "measure")
@@ -55,6 +57,15 @@ def proof_lines(plan: RigPlan) -> list[str]:
         f"         {_regions(plan)}",
         *_excluded(proofs.projectors),
     ]
+
+
+def _of_family(plan: RigPlan) -> list[str]:
+    """What bounds a family's rig: the rest is of its worst member, alone."""
+    if plan.document.family is None:
+        return []
+    worst = plan.document.members[plan.document.family.worst].name
+    below = f"below: what is proved of {worst} alone, the worst member"
+    return labelled("FAMILY", [*family_bounds(plan), below])
 
 
 def _of_any(plan: RigPlan, kind: str) -> str:
