@@ -23,6 +23,7 @@ from planning.cli.batch.parts import find_parts
 from planning.cli.batch.sent_files import part_files, rig_files
 from planning.cli.main import commands
 from planning.model.errors import InputError
+from planning.report.summary.shortfall import missing
 
 RIG = """
 base = "default"
@@ -377,6 +378,21 @@ def test_a_row_tells_how_many_are_needed_not_how_many_there_may_be(tmp_path, han
     write_index([row], tmp_path)
     page = (tmp_path / "index.html").read_text()
     assert page.count(f"{len(plan.cameras)}, at least 6") == 2
+
+
+def test_a_part_that_no_time_was_left_to_check_says_so(tmp_path, handmade):
+    def unchecked(document):
+        document["reconstruction"] = None
+
+    plan = handmade.tampered(handmade.build_plan(), unchecked)
+    assert tuple(missing(plan)) == ()
+    (tmp_path / "a").mkdir()
+    handmade.save(plan, tmp_path / "a")
+    row = row_of(PartEnd("a.stl", 1, "", 2.0, {}), "a", tmp_path, "x")
+    assert (row.verdict, row.message) == (
+        "NOT MET",
+        "the check wasn't made: the time limit came first",
+    )
 
 
 def test_the_index_rounds_down_what_its_why_does(tmp_path, handmade):
