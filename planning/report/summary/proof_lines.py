@@ -44,13 +44,15 @@ def proof_lines(plan: RigPlan) -> list[str]:
     if fewest := fewest_words(plan):
         return ["", *labelled("FEWEST", [fewest]), f"         {_regions(plan)}"]
     poses = light_of(plan.projectors[0].device).bounded_over
+    # About others cameras may measure more.
+    axes = "" if plan.document.ring_axes is None else " and their ring axes"
     return [
         "",
         *_of_family(plan),
         _proof(plan, "projector", requirements.dominant_coverage, "light"),
         _continuous(proofs.projectors, poses + _of_any(plan, "projector")),
         _proof(plan, "camera", requirements.coverage, "measure")
-        + " (given these projectors)",
+        + f" (given these projectors{axes})",
         _continuous(proofs.cameras, "position, aim and roll" + _of_any(plan, "camera")),
         *surviving_proofs(plan),
         *route_lines(proofs.cameras),
