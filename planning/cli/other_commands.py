@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from geometry.files.archives import is_mesh_name
 from geometry.mesh.mesh import TriangleMesh
 from geometry.parallel import n_threads
 from geometry.shapes.sample_head.head_shape import HeadShape
@@ -95,21 +96,25 @@ def sample_command(output: Path, faces: int, variant: int | None) -> int:
 def sample_family_command(folder: Path, faces: int, count: int, seed: int) -> int:
     """Write a family of heads, from child to adult."""
     digits = max(2, len(str(count)))
+    names = [f"head-{k + 1:0{digits}}.obj" for k in range(count)]
     done = 0
     try:
         with writable(folder):
-            for done in range(count):
-                path = folder / f"head-{done + 1:0{digits}}.obj"
-                write_sample(path, shape=HeadShape.of_family(seed, done), n_faces=faces)
+            for done, name in enumerate(names):
+                shape = HeadShape.of_family(seed, done)
+                write_sample(folder / name, shape=shape, n_faces=faces)
     except KeyboardInterrupt:
         if not done:
             raise
         told = f"interrupted; {folder} has {done} of {count_words(count, 'head')}"
         raise KeyboardInterrupt(told) from None
+    there = {path.name for path in folder.iterdir() if is_mesh_name(path.name)}
+    others = len(there - {*names})
+    beside = f" and {count_words(others, 'other')} there" if others else ""
     click.echo(
         f"wrote {folder}: {count_words(count, 'head')} in millimetres, from child to "
         f"adult; `plan --mesh {shell_word(folder)} --max-projectors 5` plans one rig "
-        f"for all"
+        f"for all{beside}"
     )
     return 0
 

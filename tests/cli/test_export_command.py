@@ -99,6 +99,14 @@ def test_an_interrupted_family_says_how_many_heads_there_are(tmp_path, monkeypat
     assert len(list((tmp_path / "heads").iterdir())) == 2
 
 
+def test_a_family_beside_other_meshes_says_that_they_are_planned_with_it(tmp_path):
+    words = ["sample", "--faces", "500", "-o", str(tmp_path / "heads"), "--family"]
+    first = CliRunner().invoke(commands, [*words, "3"])
+    assert first.output.endswith("plans one rig for all\n")
+    again = CliRunner().invoke(commands, [*words, "2"])
+    assert again.output.endswith("plans one rig for all and 1 other there\n")
+
+
 def test_files_of_an_older_export_go_and_a_users_stay(folder, plain, tmp_path):
     export(folder, "--to", "aim,ros", "-o", tmp_path)
     (tmp_path / "ros" / "mine.txt").write_text("notes")
