@@ -32,9 +32,9 @@ _MULTIPLIERS_SHARE = 0.75
 # A look for cells that survive: of so many poses at least, as of fewer multipliers soon
 # say all; multisets split at a time; and counted work, beside the budget.
 _LOOKED_FOR, _FEW, _LOOK = 2, 4, 2e8
-# Multisets that are soon followed, and work for multipliers of what larger ones refute,
-# in budgets.
-_FOLLOWED, _AGAIN = 2, 2.0
+# Multisets that are soon followed, and counted work for multipliers of what larger ones
+# refute, beside the budget.
+_FOLLOWED, _AGAIN = 2, 1.2e10
 _BY_MULTIPLIERS = "multipliers of the rows"
 
 
@@ -230,7 +230,7 @@ class _Proof:
     def _again(self) -> None:
         """Let multipliers refute what multisets did, beside the budget."""
         ended = self.search.out_of_work
-        self.share.renew(_AGAIN * self.budget.units)
+        self.share.renew(_AGAIN)
         if self.search.refute(self.by_multisets):
             self.proof = _BY_MULTIPLIERS
         # What ended the search is what ended it before.
