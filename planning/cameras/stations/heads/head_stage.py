@@ -61,7 +61,9 @@ def stages_of(
     # that has none every camera would.
     measured = np.zeros((len(bright), len(cameras)), dtype=bool)
     for stationed in {bool(camera.station) for camera in cameras}:
-        here = [k for k, lamp in enumerate(lamps) if bool(lamp.station) is stationed]
+        here = [*range(n_projectors)]
+        if stationed:
+            here = [k for k, lamp in enumerate(lamps) if lamp.station]
         by = LitSamples.of(
             [lamps[k] for k in here], samples.target, lit[np.ix_(bright, here)]
         )
