@@ -289,8 +289,7 @@ def _devices_sought(
 ) -> Search[PartialPlan, Draft]:
     """Devices, rings and proofs; one device more where fresh samples fall short.
 
-    Fewer cameras are sought once for the same projectors and axes: where fresh samples
-    denied those that were found, they would be found, and denied, without end.
+    Fewer cameras are sought once for the same axes: denied ones would be found again.
     """
     larger: PartialPlan | None = _first_plan(request, clock)
     sought = False

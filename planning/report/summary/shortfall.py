@@ -10,6 +10,7 @@ from planning.model.document.plan_document import PlanDocument
 from planning.model.plan import RigPlan
 from planning.model.requirements import Requirements
 from planning.model.words import area_words, percent
+from planning.report.advice.accepted import accepting_all
 from planning.report.entries.survival_entries import falls_short_after
 from planning.report.tolerance.survival_lines import (
     lit_words,
@@ -17,7 +18,6 @@ from planning.report.tolerance.survival_lines import (
     pairs_words,
 )
 
-from .accepted import accepting_all
 from .cause_words import (
     areas_line,
     causes_left,

@@ -65,7 +65,7 @@ def stages_of(
         if stationed:
             here = [k for k, lamp in enumerate(lamps) if lamp.station]
         by = LitSamples.of(
-            [lamps[k] for k in here], samples.target, lit[np.ix_(bright, here)]
+            [lamps[k] for k in here], samples.target, lit[bright][:, here]
         )
         some = [k for k, c in enumerate(cameras) if bool(c.station) is stationed]
         those, theirs = [cameras[k] for k in some], [seen[k] for k in some]
