@@ -55,9 +55,7 @@ def experiment_command(options: Mapping[str, Any]) -> int:
             threads=threads,
             tolerance_m=1e-3 * near_mm if options["single_shot"] else None,
             progress=countdown(
-                report,
-                n_views=min(threads, len(experiment.scanner.cameras)),
-                threads=threads,
+                report, n_cameras=len(experiment.scanner.cameras), threads=threads
             ),
         )
         both = None

@@ -47,8 +47,10 @@ def margin_at_share(margin: NDArray[np.float64], required: int) -> float:
     Margins of each sample (row) and projector are -inf where unlit, and so is the
     answer where fewer are lit; where none is required it is inf.
     """
-    if not 0 < required <= len(margin):
-        return np.inf if required <= 0 else -np.inf
+    if required <= 0:
+        return np.inf
+    if required > len(margin):
+        return -np.inf
     best = margin.max(axis=1, initial=-np.inf)
     return float(np.partition(best, len(best) - required)[len(best) - required])
 

@@ -57,7 +57,8 @@ def audit_family(plan: RigPlan, cases: Sequence[AuditCase]) -> tuple[str, ...]:
     served = [case for m, case in enumerate(cases) if m not in left]
     if axes is not None and axes.taken == "centred":
         # Members may have been left out before axes were chosen, or afterwards.
-        audit_centred((served, cases), findings.at("ring_axes"))
+        groups = (served, cases) if left else (cases,)
+        audit_centred(groups, findings.at("ring_axes"))
     for m, case in enumerate(cases):
         if m not in left:
             audit_served(case, findings.at(f"members.{m}"))

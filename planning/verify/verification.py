@@ -264,11 +264,11 @@ def _reconstruct(
     believed = Scanner.of(plan)
     samples = bare(case.samples)
     expected = Expected(samples, case.actual.measured, case.actual.by_pair)
-    # With projectors the others are cast while pairs are drawn.
-    at_once = threads if not plan.cameras_alone else len(believed.cameras)
-    n_views = min(at_once, len(believed.cameras))
     count = countdown(
-        lambda line: say(f"pixels: {line}"), n_views=n_views, threads=threads
+        lambda line: say(f"pixels: {line}"),
+        n_cameras=len(believed.cameras),
+        threads=threads,
+        all_first=plan.cameras_alone,
     )
 
     def told(done: int, n: int) -> None:

@@ -147,8 +147,7 @@ def _reconstruct(
     report("predicting what the plan's poses measure")
     predicted = predict_measured(plan, seed=seed, threads=threads)
     expected = Expected(bare(predicted.samples), predicted.measured, predicted.by_pair)
-    n_views = min(threads, len(scanner.cameras))
-    progress = countdown(report, n_views=n_views, threads=threads)
+    progress = countdown(report, n_cameras=len(scanner.cameras), threads=threads)
     light = assumed_light(scanner)
     if options["ambient"] is not None:
         light = replace(light, ambient=options["ambient"])

@@ -7,7 +7,7 @@ from planning.verify.reconstruction.render.countdown import countdown
 def test_it_goes_by_the_machine_that_it_runs_on(monkeypatch):
     now, said = [100.0], []
     monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
-    pair_done = countdown(said.append, n_views=2, threads=2)
+    pair_done = countdown(said.append, n_cameras=2, threads=2)
     # Two views in 2 s: six pairs as long as 8.4 views of 1 s each, two at a time.
     now[0] += 2.0
     pair_done(0, 6)

@@ -60,13 +60,11 @@ def stages_of(
     # One without a station would measure with projectors of every station, and with one
     # that has none every camera would.
     measured = np.zeros((len(bright), len(cameras)), dtype=bool)
+    at_stations = np.array([bool(lamp.station) for lamp in lamps])
+    planned_ones = np.arange(len(lamps)) < n_projectors
     for stationed in {bool(camera.station) for camera in cameras}:
-        here = [*range(n_projectors)]
-        if stationed:
-            here = [k for k, lamp in enumerate(lamps) if lamp.station]
-        by = LitSamples.of(
-            [lamps[k] for k in here], samples.target, lit[bright][:, here]
-        )
+        counts = at_stations if stationed else planned_ones
+        by = replace(samples, lit=samples.lit & counts)
         some = [k for k, c in enumerate(cameras) if bool(c.station) is stationed]
         those, theirs = [cameras[k] for k in some], [seen[k] for k in some]
         measured[:, some] = measured_by(scene, those, by, theirs)

@@ -12,13 +12,18 @@ _VIEWS_A_PAIR = 1.4
 
 
 def countdown(
-    say: Callable[[str], None], *, n_views: int, threads: int
+    say: Callable[[str], None],
+    *,
+    n_cameras: int,
+    threads: int,
+    all_first: bool = False,
 ) -> Callable[[int, int], None]:
     """Return what is to be called with the pairs done and their total.
 
-    That is 0 when so many views have been cast: how long this took tells what the pairs
-    will take, on whatever machine.
+    That is 0 when each thread has cast a view, or all views have been cast first: how
+    long this took tells what the pairs will take, on whatever machine.
     """
+    n_views = n_cameras if all_first else min(threads, n_cameras)
     begin = time.monotonic()
 
     def pair_done(done: int, total: int) -> None:
