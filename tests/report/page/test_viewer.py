@@ -216,6 +216,35 @@ def test_a_device_s_view_is_its_own_image(shown):
     page.choose("view", "all")
 
 
+# The wheel over a place beside the object's middle, and how near it came to there.
+WHEEL = """
+const {stage, surface} = ringrig;
+const {canvas, free} = stage;
+const at = surface.centroid(0);
+const far = () => free.position.distanceTo(at);
+const before = [...stage.spot(at), far()];
+const box = canvas.getBoundingClientRect();
+for (let k = 0; k < arguments[0]; k++) {
+  const [x, y] = stage.spot(at);
+  const to = {clientX: box.left + x, clientY: box.top + y, deltaY: -240, bubbles: true};
+  canvas.dispatchEvent(new WheelEvent("wheel", to));
+}
+const size = [canvas.clientWidth, canvas.clientHeight];
+return [before, [...stage.spot(at), far()], size];"""
+
+
+def test_the_wheel_goes_on_to_what_is_under_it(shown):
+    _, page = shown
+    page.choose("view", "object")
+    page.choose("view", "all")
+    before, after, size = page.run(WHEEL, 8)
+    assert np.abs(np.subtract(before[:2], np.divide(size, 2))).max() > 20
+    # The wheel tells whole pixels, from whole pixels.
+    np.testing.assert_allclose(after[:2], before[:2], atol=8)
+    assert after[2] < 0.3 * before[2]
+    page.run("ringrig.stage.onHome()")
+
+
 def test_the_sequence_steps_and_distances_are_measured(shown):
     plan, page = shown
     n = len(plan.projectors)

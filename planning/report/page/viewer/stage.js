@@ -7,6 +7,8 @@ THREE.ColorManagement.enabled = false;
 
 const TURN = 0.006;
 const STEP = 0.08;
+// Of the rig's reach: how near the free camera comes.
+const NEAREST = 0.02;
 
 export class Stage {
   constructor(canvas, antialias, centre, up, places) {
@@ -80,15 +82,24 @@ export class Stage {
     this.place();
   }
 
-  zoom(factor) {
-    if (this.eye) this.eye.zoom(1 / factor);
-    else this.distance = Math.min(Math.max(this.distance * factor, 0.02 * this.reach), 30 * this.reach);
-    if (this.eye) this.redraw();
-    else this.place();
+  // Goes on towards a place of the canvas, from its middle in parts of its height, as
+  // the object is near: what lies there stays there, and turning is about it.
+  zoom(factor, [x, y] = [0, 0]) {
+    if (this.eye) {
+      this.eye.zoom(1 / factor);
+      return this.redraw();
+    }
+    const back = new THREE.Vector3().setFromMatrixColumn(this.free.matrix, 2);
+    const depth = this.free.position.clone().sub(this.centre).dot(back);
+    const before = depth > NEAREST * this.reach ? depth : this.distance;
+    const after = Math.min(Math.max(before * factor, NEAREST * this.reach), 30 * this.reach);
+    this.target.copy(this.free.position).addScaledVector(back, -before);
+    this.distance = after;
+    this.pan((1 - before / after) * x, (1 - before / after) * y);
   }
 
   pan(dx, dy) {
-    const scale = this.distance * 0.6;
+    const scale = 2 * Math.tan((0.5 * Math.PI * this.free.fov) / 180) * this.distance;
     this.target.addScaledVector(new THREE.Vector3().setFromMatrixColumn(this.free.matrix, 0), -dx * scale);
     this.target.addScaledVector(new THREE.Vector3().setFromMatrixColumn(this.free.matrix, 1), dy * scale);
     this.place();
@@ -126,7 +137,9 @@ export class Stage {
       "wheel",
       (event) => {
         event.preventDefault();
-        this.zoom(Math.exp(0.0012 * event.deltaY));
+        const [wide, high] = [canvas.clientWidth, canvas.clientHeight];
+        const place = [(event.offsetX - wide / 2) / high, (event.offsetY - high / 2) / high];
+        this.zoom(Math.exp(0.0012 * event.deltaY), place);
       },
       { passive: false },
     );
