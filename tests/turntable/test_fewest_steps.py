@@ -11,7 +11,11 @@ import pytest
 from geometry.mesh.sampling import SurfaceSamples
 from planning.cameras.stations.heads.head_cover import HeadCover
 from planning.cameras.stations.turntable.fewest_steps import StepSearch
-from planning.cameras.stations.turntable.sample_bits import rows_together, subsets
+from planning.cameras.stations.turntable.sample_bits import (
+    are_enough_together,
+    rows_together,
+    subsets,
+)
 from planning.cameras.stations.turntable.table_sets import TableSets
 from planning.scene.samples import Target
 
@@ -266,6 +270,10 @@ def test_rows_that_hold_enough_together_are_all_found(count):
         if rows[list(chosen)].any(axis=0).sum() >= asked
     }
     assert {tuple(sorted(chosen)) for chosen in found} == truth
+    for most in range(25):
+        some = next(rows_together(bits, count, most), None) is not None
+        assert are_enough_together(bits, count, most) == some
+    assert not are_enough_together(bits[:0], count, 0)
 
 
 @pytest.mark.parametrize("count", [1, 4, 5])

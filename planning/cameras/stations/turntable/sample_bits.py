@@ -68,6 +68,19 @@ def rows_together(bits: Bits, count: int, asked: int) -> Iterator[tuple[int, ...
         yield chosen
 
 
+def are_enough_together(bits: Bits, count: int, asked: int) -> bool:
+    """Whether any so many rows (n, b) hold enough together."""
+    alone = held_by(bits)
+    if count == 1:
+        return bool(np.any(alone >= asked))
+    order = np.argsort(-alone, kind="stable")
+    bits, alone = bits[order], alone[order]
+    return any(
+        are_enough_together(bits[k] | bits[k + 1 :], count - 1, asked)
+        for k in range(int(np.count_nonzero(count * alone >= asked)))
+    )
+
+
 def rows_of_most(bits: Bits, count: int) -> list[int]:
     """Return rows (n, b) that hold most, each beside those before it."""
     held, chosen = np.zeros(bits.shape[1], dtype=np.uint8), list[int]()

@@ -11,7 +11,14 @@ from geometry.arrays import Ints
 from planning.cameras.stations.heads.head_cover import HeadCover
 
 from .circle import Circle
-from .sample_bits import Bits, held_by, joined, packed, rows_together, subsets
+from .sample_bits import (
+    Bits,
+    are_enough_together,
+    held_by,
+    joined,
+    packed,
+    subsets,
+)
 from .table_sets import Place, TableSets
 
 
@@ -89,7 +96,7 @@ class StepChoices:
             _, bits = self.measured(lamps, angles)
             alone = np.sort(held_by(bits))[-n_eyes:]
             if alone.sum() >= measured and (
-                len(lamps) > 1 or next(rows_together(bits, n_eyes, measured), None)
+                len(lamps) > 1 or are_enough_together(bits, n_eyes, measured)
             ):
                 most = max(most, held)
         return most

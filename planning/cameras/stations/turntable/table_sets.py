@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -112,6 +113,8 @@ class TableSets:
     def _offset(self, places: int) -> int | None:
         """The column of an offset; None where so far apart none was looked at."""
         half = self.lattice.n_places // 2
-        centred = (places + half) % self.lattice.n_places - half
-        found = np.flatnonzero(self.lattice.offsets == centred)
-        return int(found[0]) if len(found) else None
+        return self._columns.get((places + half) % self.lattice.n_places - half)
+
+    @cached_property
+    def _columns(self) -> dict[int, int]:
+        return {int(o): column for column, o in enumerate(self.lattice.offsets)}
