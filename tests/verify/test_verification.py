@@ -7,6 +7,7 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 import trimesh
+from support.plain_shapes import grid
 
 from geometry.files.readers import load_mesh
 from geometry.mesh.mesh import TriangleMesh
@@ -426,10 +427,44 @@ def test_another_shape_in_the_same_box_is_named():
     assert "area" in compare_meshes(doubled, mesh, 0)[0]
 
 
+def test_a_lid_too_small_for_draws_by_area_is_another_shape():
+    """On the mouth of a pit, 1e-5 of the area: what is in it would be out of reach."""
+    top = grid(1.0, 1.0, divisions=(200, 200))
+    middle = np.argmin(np.linalg.norm(top.face_centroids[:, :2], axis=1))
+    mouth = top.corners[middle]
+    floor = mouth - [0.0, 0.0, 0.2]
+    walls = [
+        [[mouth[k], floor[k], floor[k - 1]], [mouth[k], floor[k - 1], mouth[k - 1]]]
+        for k in range(3)
+    ]
+    pit = np.concatenate([*walls, [floor]])
+    open_ones = np.delete(top.corners, middle, axis=0)
+    meshes = [
+        TriangleMesh(
+            corners.reshape(-1, 3), np.arange(corners.size // 3).reshape(-1, 3)
+        )
+        for corners in (
+            np.concatenate([open_ones, pit]),
+            np.concatenate([top.corners, pit]),
+        )
+    ]
+    (why,) = compare_meshes(*meshes, 0)
+    assert "another shape" in why
+
+
+def test_a_sheet_without_thickness_in_other_triangles_is_the_same_mesh():
+    one, other = (grid(1.0, 1.0, divisions=(n, n)) for n in (3, 7))
+    sheets = [
+        TriangleMesh(m.vertices, np.vstack([m.faces, m.faces[:, ::-1]]))
+        for m in (one, other)
+    ]
+    assert compare_meshes(*sheets, 0) == []
+
+
 def test_faces_that_look_the_other_way_are_named():
-    """Of half a ball and of a twentieth: N is what light and view are limited by."""
+    """Of half a ball, down to three faces: N is what light and view are limited by."""
     mesh = sphere(0.05, subdivisions=3)
-    for part in (2, 20):
+    for part in (2, 20, 400):
         turned = mesh.faces.copy()
         some = slice(len(turned) // part)
         turned[some] = turned[some, ::-1]

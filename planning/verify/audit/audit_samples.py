@@ -100,8 +100,13 @@ def draw_points(
 ) -> tuple[Array, Ints]:
     """Draw n points (n, 3), and their faces, by the areas of faces, 0 of some."""
     faces = rng.choice(len(areas), size=n, p=areas / areas.sum())
-    shares = rng.dirichlet((1.0, 1.0, 1.0), size=n)
-    return np.einsum("nk,nkd->nd", shares, mesh.corners[faces]), faces
+    return points_on(mesh, faces, rng), faces
+
+
+def points_on(mesh: TriangleMesh, faces: Ints, rng: np.random.Generator) -> Array:
+    """Draw a point on each of some faces, (n, 3)."""
+    shares = rng.dirichlet((1.0, 1.0, 1.0), size=len(faces))
+    return np.einsum("nk,nkd->nd", shares, mesh.corners[faces])
 
 
 def samples_on(
