@@ -21,6 +21,19 @@ def count_words(count: int, noun: str) -> str:
     return f"{count} {noun}{'s' * (count != 1)}"
 
 
+def one_line(text: str) -> str:
+    """Return words of a stranger's file on one line, and none moves the cursor there.
+
+    What isn't shown is written out, as a control sequence, which could wipe out lines.
+    """
+    return "".join(
+        character
+        if character.isprintable()
+        else character.encode("unicode_escape").decode()
+        for character in " ".join(text.split())
+    )
+
+
 def shell_word(path: Path | str) -> str:
     """Return a path to paste into a command, which takes it for no option of its."""
     text = str(path)

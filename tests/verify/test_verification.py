@@ -337,6 +337,17 @@ def test_a_mounted_rig_that_differs_from_the_plan_fails(handmade):
     assert any("C2" in failure for failure in found.failures)
 
 
+def test_no_name_of_a_plan_wipes_out_what_is_taken_on_trust(handmade):
+    """A terminal takes words of a file for its own: up a line, and clear it."""
+    wiping = "part.obj\x1b[1A\x1b[2K\x9b2K\b\u202e"
+    plan = handmade.tampered(
+        handmade.build_plan(), lambda d: d["meshes"][0].update(path=wiping)
+    )
+    told = verify_plan(plan, check_pixels=False).summary()
+    assert r"--mesh part.obj\x1b[1A" in told
+    assert all(line.isprintable() for line in told.splitlines())
+
+
 def test_the_files_alone_are_enough_and_the_mesh_may_be_given(handmade, tmp_path):
     path = handmade.save(handmade.build_plan("parallel"), tmp_path)
     plan = RigPlan.load(path)
