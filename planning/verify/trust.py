@@ -195,20 +195,19 @@ def _of_mesh(plan: RigPlan, mesh: TriangleMesh | None) -> tuple[str, ...]:
         f"the unit of the mesh file, {record.unit} by the plan, in which it is "
         f"{x:.4g} x {y:.4g} x {z:.4g} mm"
     )
+    lines = list[str]()
     if mesh.source is None or mesh.source.sha256 != record.sha256:
-        return (
+        lines.append(
             "the mesh file that was planned (meshes): the one given has the same shape "
-            "and other bytes",
-            unit,
+            "and other bytes"
         )
-    same = mesh.faces.shape == planned.faces.shape
-    if same and np.allclose(mesh.corners, planned.corners, 0.0, 1e-9 * mesh.radius):
-        return (unit,)
-    return (
-        "how the surface is cut into triangles, along which samples of bounds lie "
-        "(faces in surface.npz): the mesh file's are others",
-        unit,
-    )
+    near, same = 1e-9 * mesh.radius, mesh.faces.shape == planned.faces.shape
+    if not (same and np.allclose(mesh.corners, planned.corners, 0.0, near)):
+        lines.append(
+            "how the surface is cut into triangles, along which samples of bounds lie "
+            "(faces in surface.npz): the mesh file's are others"
+        )
+    return (*lines, unit)
 
 
 def held_against_others(

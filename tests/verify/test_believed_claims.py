@@ -137,15 +137,18 @@ def test_how_many_stations_it_takes_is_told(checked, handmade):
     assert line not in named(checked, APART, EXACTLY)
 
 
+@pytest.mark.parametrize("known", [False, True])
 @pytest.mark.parametrize("turned", [False, True])
-def test_triangles_that_a_mesh_file_has_otherwise_are_told(checked, turned):
-    """Samples lie along them: in another order they are others."""
+def test_triangles_that_a_mesh_file_has_otherwise_are_told(checked, turned, known):
+    """Samples lie along them: in another order they are others, whosever the digest."""
     mesh = checked.surface.mesh
-    source = SimpleNamespace(sha256=checked.document.meshes[0].sha256)
+    sha256 = checked.document.meshes[0].sha256 if known else "0"
+    source = SimpleNamespace(sha256=sha256)
     faces = mesh.faces[::-1] if turned else mesh.faces
     given = replace(TriangleMesh(mesh.vertices, faces), source=source)
     told = "\n".join(taken_on_trust(checked, given, EXACTLY, EXACTLY))
     assert ("cut into triangles" in told) is turned
+    assert ("other bytes" in told) is not known
 
 
 def test_what_only_a_check_again_gives_is_named_likewise(checked):
