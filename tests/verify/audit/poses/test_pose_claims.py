@@ -161,6 +161,33 @@ def test_what_existing_devices_cover_is_free(handmade, case) -> None:
     assert bounds["projector"].line.endswith("proved: so many stand already")
 
 
+@pytest.mark.parametrize("turned", [False, True])
+def test_what_a_turntable_turns_is_seen_from_all_around(handmade, case, turned) -> None:
+    """Where devices stand in the room they see no sample, but at other steps."""
+    step = {"id": "T1", "world_from_station": np.eye(4).tolist(), "angle": 0.0}
+    step |= {"projectors": ["P1", "P2"], "cameras": ["C1", "C2"]}
+    table = {"kind": "turntable", "stations": [step]}
+    proof = case.plan.proof.over_poses["projector"]
+    normals = case.plan.surface.mesh.face_normals[proof.faces]
+    behind = (-normals.mean(axis=0)).tolist()
+
+    def behind_it(document: dict[str, Any]) -> None:
+        space = document["requirements"]["workspace"]
+        space |= {"axis": behind, "half_angle": 0.1}
+        if turned:
+            document["stations"] = table
+
+    plan = with_bound(
+        handmade.tampered(case.plan, behind_it), "projector", lower_bound=10
+    )
+    more = {"projector": replace(proof, n_devices=9)}
+    bounds, false = held(
+        case, with_file(with_bound(plan, "camera", certificate="none"), more)
+    )
+    assert not false
+    assert ("is claimed" in bounds["projector"].line) is turned
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("kind", _KINDS)
 def test_forged_ones_are_never_called_proved(case, kind) -> None:

@@ -9,8 +9,10 @@ import numpy as np
 from geometry.arrays import Array, Ints, Mask
 from geometry.devices import ParallelModel, PinholeModel
 from planning.model.plan import RigPlan
+from planning.model.requirements import Requirements
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_samples import AuditSamples
+from planning.verify.audit.devices.workspace_claims import turns
 from planning.verify.audit.predicates.audit_devices import audit_projectors
 from planning.verify.audit.predicates.predicates import LIT, MEASURED, light_steps
 from planning.verify.audit.predicates.recompute import light_of_plan, pairs_with
@@ -83,7 +85,7 @@ def device_cells(
         lit_by: Which of them each of the plan's projectors lights, (n_p, n).
         shadows: Whether what is in the way counts.
     """
-    plan, limits = case.plan, case.plan.requirements
+    plan, limits = case.plan, _required(case.plan)
     space, devices = limits.workspace, optics_of(plan, kind)
     shell = space.projector_radius_m if kind == "projector" else space.camera_radius_m
     centre = np.array(space.centre)
@@ -151,6 +153,17 @@ def _outside(
     return depth, float(np.arcsin(across / near)) if depth > reach else np.pi
 
 
+def _required(plan: RigPlan) -> Requirements:
+    """Return its requirements, and where devices stand as the part sees them.
+
+    What turns sees them all around, in whatever part of a room they are.
+    """
+    required = plan.requirements
+    if not turns(plan):
+        return required
+    return replace(required, workspace=required.workspace.whole_shell)
+
+
 def _lit(
     plan: RigPlan,
     samples: AuditSamples,
@@ -159,8 +172,8 @@ def _lit(
     some: Ints,
     skies: Skies | None,
 ) -> OptimisticCells:
-    limits, space = plan.requirements.projector, plan.requirements.workspace
-    return LitCells(space, samples.take(some), limits, ends, skies, aside)
+    required, taken = _required(plan), samples.take(some)
+    return LitCells(required.workspace, taken, required.projector, ends, skies, aside)
 
 
 def _measured(
@@ -171,7 +184,7 @@ def _measured(
     some: Ints,
     skies: Skies | None,
 ) -> OptimisticCells:
-    required, taken = plan.requirements, samples.take(some)
+    required, taken = _required(plan), samples.take(some)
     cameras = [d for d in optics_of(plan, "camera") if isinstance(d, PinholeModel)]
     projectors = audit_projectors(plan)
     offered = [
