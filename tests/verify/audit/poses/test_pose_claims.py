@@ -258,6 +258,24 @@ def test_less_area_than_can_be_derived_stays_claimed(case) -> None:
     )
 
 
+def test_what_is_taken_of_a_part_of_a_draw_counts_for_nothing(case) -> None:
+    """A fifth of the samples would lie on the first thousandth of the surface."""
+    proof, plan = case.plan.proof.over_poses["projector"], case.plan
+    seed = np.random.SeedSequence([plan.document.seed, 101]).generate_state(1)[0]
+    within = plan.surface.target_faces(plan.requirements.target)
+    more = sample_surface(plan.surface.mesh, 50_000, seed=int(seed), within=within)
+    some = _N + _N // 5
+    changes = {
+        "draws": np.array([[_N, 100, 1], [50_000, 101, 1]]),
+        "faces": np.concatenate([proof.faces, more.faces]),
+        "multipliers": np.ones(some, dtype=np.int64),
+    }
+    forged = with_proof(plan, "projector", **changes)
+    bounds, false = held(case, with_bound(forged, "projector", n_samples=some))
+    assert not false
+    assert f"of {_N} samples" in bounds["projector"].line
+
+
 _EDITS: dict[str, dict[str, object]] = {
     "samples aren't": {"draws": np.array([[_N, 101, 1]])},
     "less than 250": {"draws": np.array([[_N, 100, 2]])},

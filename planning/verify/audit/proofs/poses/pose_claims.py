@@ -136,13 +136,16 @@ def _derived(
         raise RefutedProofError(
             f"it is of {n_samples} samples, and {table.n_samples} are claimed"
         )
-    samples = every.take(np.arange(n))
+    # The rest of a draw lies on a part of the surface, which would count for more.
+    whole = proof.n_whole
+    lit_by, n_samples = lit_by[:, :whole], int(lit[:whole].sum())
+    samples = every.take(np.arange(whole))
     reached = covered_by_candidates(case, kind.name, samples).any(axis=1)
     free = reached & free_of_existing(case, kind.name, samples)
     required = int(np.ceil(kind.share * int(reached.sum()) - 1e-9)) - int(free.sum())
     search = _Search(
-        device_cells(case, kind.name, samples, lit_by[:, :n], shadows=table.occlusion),
-        proof.multipliers,
+        device_cells(case, kind.name, samples, lit_by, shadows=table.occlusion),
+        proof.multipliers[:whole],
         np.flatnonzero(reached & ~free),
         lambda line: say(f"proofs: {kind.name}s: {line}"),
     )
