@@ -37,9 +37,13 @@ def unpacked_arrays(content: bytes) -> dict[str, NDArray[Any]]:
     most = max(_LEAST, _TIMES * len(content))
     try:
         with ZipFile(BytesIO(content)) as archive:
-            size = sum(entry.file_size for entry in archive.infolist())
+            entries = archive.infolist()
+        size = sum(entry.file_size for entry in entries)
         if size > most:
             raise PlanFileError(f"it unpacks to {size} bytes, at most {most} are read")
+        names = [entry.filename.removesuffix(".npy") for entry in entries]
+        if len(set(names)) < len(names):
+            raise PlanFileError("two of its arrays have one name")
         with np.load(BytesIO(content), allow_pickle=False) as archive:
             return {name: archive[name] for name in archive.files}
     except PlanFileError:

@@ -5,6 +5,7 @@
 
 from collections import Counter
 from io import BytesIO
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
@@ -40,3 +41,16 @@ def test_what_unpacks_to_far_more_than_it_takes_is_refused(monkeypatch):
     np.savez_compressed(plain, some=np.arange(10_000.0))
     (some,) = packed_arrays.unpacked_arrays(plain.getvalue()).values()
     np.testing.assert_array_equal(some, np.arange(10_000.0))
+
+
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+@pytest.mark.parametrize("name", ["some.npy", "some"])
+def test_two_arrays_of_one_name_are_refused(name):
+    """One reader takes the first of them, another the last."""
+    buffer, other = BytesIO(), BytesIO()
+    np.savez_compressed(buffer, some=np.zeros(3))
+    np.save(other, np.ones(3))
+    with ZipFile(buffer, "a") as archive:
+        archive.writestr(name, other.getvalue())
+    with pytest.raises(PlanFileError, match="two of its arrays have one name"):
+        packed_arrays.unpacked_arrays(buffer.getvalue())
