@@ -128,6 +128,7 @@ _EDITS: dict[str, Callable[[CoverProof], CoverProof]] = {
     "samples": lambda p: replace(p, points=p.points + [0.0, 0.0, 1e-5]),
     "its samples": lambda p: replace(p, faces=p.faces[::-1].copy()),
     "samples aren't": lambda p: replace(p, draws=p.draws + [0, 1, 0]),
+    "aren't those": lambda p: replace(p, draws=p.draws + [50, 0, 0]),
     "made again": lambda p: replace(p, draws=p.draws * [1, 1, 0]),
     "can't be made": lambda p: replace(p, draws=np.concatenate([p.draws, p.draws])),
     "are of streams": lambda p: replace(p, draws=p.draws + [0, 13, 0]),

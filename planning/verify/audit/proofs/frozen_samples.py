@@ -80,8 +80,8 @@ def drawn_again(
         owners.append(drawn.faces[::every])
     at, of = np.concatenate(places), np.concatenate(owners)
     near = _NEAR * float(np.ptp(surface.mesh.bounds, axis=0).max())
-    same = points is None or bool(np.all(np.abs(at - points) <= near))
-    if not (np.array_equal(of, faces) and same):
+    same = np.array_equal(of, faces)
+    if not (same and (points is None or np.all(np.abs(at - points) <= near))):
         raise RefutedProofError("its samples aren't those that its draws give")
     return samples_on(surface, at, of, np.ones(len(of), dtype=bool))
 
