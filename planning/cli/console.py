@@ -195,11 +195,16 @@ def print_json(document: Mapping[str, Any]) -> None:
 
 
 @contextmanager
-def writable(folder: Path) -> Generator[None]:
+def writable(folder: Path, *names: str) -> Generator[None]:
     """Fail before the work, not after it; leave no empty folder where it fails.
 
+    Args:
+        folder: Where files go.
+        names: Of files that will be there.
+
     Raises:
-        click.UsageError: If nothing can be written into the folder.
+        click.UsageError: If nothing can be written into the folder, or a folder has
+            one of these names.
     """
     try:
         missing = [f for f in (folder, *folder.parents) if not f.exists()]
@@ -210,6 +215,12 @@ def writable(folder: Path) -> Generator[None]:
         raise click.UsageError(
             f"can't write to {folder}: {error.strerror}; choose another folder with -o"
         ) from None
+    for path in (folder / name for name in names):
+        if path.is_dir():
+            raise click.UsageError(
+                f"{path} is a folder, and a file is to be there; move it, or choose "
+                f"another folder with -o"
+            )
     try:
         yield
     except BaseException:

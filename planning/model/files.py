@@ -102,7 +102,14 @@ def write_together(files: Mapping[Path, Callable[[BinaryIO], object]]) -> None:
     Args:
         files: For each path what receives the open binary file, several at a time;
             folders must exist.
+
+    Raises:
+        OSError: If a file can't be written.
     """
+    if folder := next((path for path in files if path.is_dir()), None):
+        raise IsADirectoryError(
+            f"{folder} is a folder, and a file is to be there; move it"
+        )
     umask = os.umask(0)
     os.umask(umask)
     with ExitStack() as undo:

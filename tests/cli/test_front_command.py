@@ -103,6 +103,17 @@ def test_a_point_is_planned_into_the_fronts_folder(front, plan, folder):
     assert (folder / "plate-front" / "pareto.npz").exists()
 
 
+def test_a_folder_in_the_matrix_place_is_told_before_the_work(
+    plan, folder, monkeypatch
+):
+    monkeypatch.setattr("planning.cli.plans.front_command.plan_front", None)
+    (folder / "taken" / "pareto.npz").mkdir(parents=True)
+    code, out, told = plan("--pareto", "-o", "taken")
+    assert (code, out) == (2, "")
+    assert "taken/pareto.npz is a folder, and a file is to be there" in told
+    assert "Errno" not in told
+
+
 @pytest.mark.parametrize(
     ("words", "code", "sentence"),
     [

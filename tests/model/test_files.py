@@ -51,6 +51,18 @@ def test_files_that_belong_together_move_together(tmp_path):
     assert sorted(os.listdir(tmp_path)) == ["a", "b"]
 
 
+def test_a_folder_in_a_files_place_is_named_and_no_other_file_written(tmp_path):
+    (tmp_path / "b").mkdir()
+    files = {tmp_path / name: lambda file: file.write(b"new") for name in "ab"}
+    with pytest.raises(IsADirectoryError) as refused:
+        write_together(files)
+    where = tmp_path / "b"
+    assert (
+        str(refused.value) == f"{where} is a folder, and a file is to be there; move it"
+    )
+    assert os.listdir(tmp_path) == ["b"]
+
+
 def test_files_are_readable_by_others_as_a_plain_open_makes_them(tmp_path):
     write_atomically(tmp_path / "a", lambda file: file.write(b"x"))
     (tmp_path / "b").write_bytes(b"x")

@@ -33,7 +33,8 @@ def front_command(options: Mapping[str, Any]) -> int:
     clock = timed(options, click.get_current_context().obj)
     path = Path(options["ranges"] or options["meshes"][0])
     folder = front_folder(options, path)
-    with writable(folder), progress(quiet=options["quiet"]) as report:
+    names = CSV_FILE, PICTURE_FILE, FRONT_FILE
+    with writable(folder, *names), progress(quiet=options["quiet"]) as report:
         with clock.ticking():
             rig = load_rig(options["rig_name"], light=options["light"])
             fixed = read_fixed(options["fixed"], rig)
