@@ -20,8 +20,9 @@ def plan(handmade):
     return handmade.build_plan()
 
 
-def missed(plan, *, blocked=None, relaxations=(), pattern="rings", **areas):
+def missed(plan, *, blocked=None, relaxations=(), pattern="rings", command=(), **areas):
     document = plan.to_document()
+    document["command"] = [*command]
     document["coverage"]["relaxations"] = list(relaxations)
     if blocked is not None:
         document["coverage"]["blocked_by_body_m2"] = blocked
@@ -91,6 +92,17 @@ def test_cameras_that_miss_by_a_hair_offer_the_share_they_reach(plan):
     assert line.startswith("3 cameras measure 93.9 %")
     assert "--coverage 0.93 accepts this plan" in line
     assert "--max-cameras" not in line
+
+
+def test_a_point_of_a_front_is_told_another_point(plan):
+    """`--take` says how many there are, and the front was made for what is asked."""
+    taken = "plan", "face.obj", "--take", "1,1"
+    (line,) = missed(plan, command=taken, lit_m2=0.4)
+    n_cameras = len(plan.cameras)
+    assert f"--take 5,{n_cameras} (at least 4 claimed" in line
+    assert "--max-projectors" not in line
+    accepts = "--dominant-coverage 0.40 accepts this plan if the front is made again"
+    assert f"{accepts} with it" in line
 
 
 def test_what_accepts_a_plan_that_misses_several_is_told_together(plan):

@@ -11,6 +11,7 @@ from planning.model.plan import RigPlan
 from planning.model.requirements import Requirements
 from planning.model.words import area_words, percent
 from planning.report.advice.accepted import accepting_all
+from planning.report.advice.of_fronts import of_fronts
 from planning.report.entries.survival_entries import falls_short_after
 from planning.report.tolerance.survival_lines import (
     lit_words,
@@ -67,7 +68,7 @@ def missing(plan: RigPlan) -> Iterator[Shortfall]:
             every.append(replace(one, figure=figure, missed=missed))
     if not plan.members:
         every = list(_missing(plan))
-    helps = accepting_all([one.helps for one in every])
+    helps = of_fronts(plan.document, accepting_all([one.helps for one in every]))
     for one, texts in zip(every, helps, strict=True):
         yield replace(one, helps=texts)
 
