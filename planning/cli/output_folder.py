@@ -25,7 +25,8 @@ from .console import stop_signals
 # What a run writes, and what of an older plan doesn't stay beside a new one.
 _CLOUDS = ("cloud.ply", "deviation.ply")
 _DATA = ("plan.json", "surface.npz", "proof.npz")
-OWNED = (*_DATA, "members", "rig.png", PAGE, "patterns", *_CLOUDS)
+_PICTURE = "rig.png"
+OWNED = (*_DATA, "members", _PICTURE, PAGE, "patterns", *_CLOUDS)
 # `renameat2` and `renamex_np` exchange two entries under these flags.
 _EXCHANGE, _SWAP, _HERE = 2, 2, -100
 # What is younger may be what another run is writing just now [s].
@@ -38,24 +39,19 @@ _LONGEST = 200
 def exchanged(folder: Path) -> Generator[Path]:
     """Give an empty folder; what is written into it takes the place of `folder`'s.
 
-    Where a folder can't be moved (the current one, or a mount), its entries are, one
-    after the other, the plan last; readers refuse what is left of two plans.
+    Where a folder can't be moved (the current one, a mount, one in a folder that can't
+    be written), its entries are, one after the other, the plan last; readers refuse
+    what is left of two plans.
 
     Args:
         folder: Where the plan is to be; it needn't exist.
 
     Raises:
-        OSError: If nothing can be written, or `patterns` or `members` is another
-            maker's.
+        OSError: If nothing can be written, or what must give way is another maker's.
     """
+    check_ours(folder)
     folder = folder.resolve()
-    for name in ("patterns", "members"):
-        if (folder / name).exists() and not _is_ours(folder / name):
-            raise FileExistsError(
-                f"{folder / name} isn't of a plan; move it, or choose another folder "
-                f"with -o"
-            )
-    movable = not Path.cwd().is_relative_to(folder) and not folder.is_mount()
+    movable = _is_movable(folder)
     beside = folder.parent if movable else folder
     if movable:
         _recover(folder)
@@ -77,6 +73,20 @@ def exchanged(folder: Path) -> Generator[Path]:
         shutil.rmtree(fresh, ignore_errors=True)
 
 
+def check_ours(folder: Path) -> None:
+    """Refuse a folder in which another's would have to give way to a plan.
+
+    Raises:
+        FileExistsError: It names what.
+    """
+    for name in (*_DATA, _PICTURE, "members", "patterns"):
+        if (folder / name).exists() and not _is_ours(folder / name):
+            raise FileExistsError(
+                f"{folder / name} isn't of a plan; move it, or choose another folder "
+                f"with -o"
+            )
+
+
 @contextmanager
 def uninterrupted() -> Generator[None]:
     """Put off Ctrl-C and SIGTERM until this is done.
@@ -89,6 +99,13 @@ def uninterrupted() -> Generator[None]:
         yield
     if came:
         raise KeyboardInterrupt
+
+
+def _is_movable(folder: Path) -> bool:
+    """Whether a folder, or one that is still to be made, may change its place."""
+    if Path.cwd().is_relative_to(folder) or folder.is_mount():
+        return False
+    return not folder.exists() or os.access(folder.parent, os.W_OK | os.X_OK)
 
 
 def _prefix(folder: Path) -> str:
@@ -139,7 +156,7 @@ def _is_ours(entry: Path) -> bool:
         return entry.is_dir() and all(
             (member / "plan.json").is_file() for member in entry.iterdir()
         )
-    return entry.name in OWNED
+    return entry.name in OWNED and not entry.is_dir()
 
 
 def _move_entries(fresh: Path, folder: Path) -> None:

@@ -101,6 +101,28 @@ def test_patterns_and_clouds_of_others_are_safe(folder):
     assert (folder / "patterns" / "new.png").exists()
 
 
+@pytest.mark.parametrize("name", ["plan.json", "surface.npz", "rig.png", "patterns"])
+def test_another_makers_folder_is_safe_and_told_before_the_work(tmp_path, name):
+    (tmp_path / name).mkdir()
+    (tmp_path / name / "mine.txt").write_text("mine")
+    with pytest.raises(FileExistsError, match=f"{name} isn't of a plan; move it"):
+        SavedPlans(tmp_path, print, patterns=False)
+    with pytest.raises(FileExistsError, match="isn't of a plan"), exchanged(tmp_path):
+        raise AssertionError("nothing is written")
+    assert contents(tmp_path) == [f"{name}/mine.txt"]
+
+
+def test_a_folder_changes_where_nothing_can_stand_beside_it(folder, monkeypatch):
+    def may(path, mode):
+        return path != folder.parent
+
+    monkeypatch.setattr(output_folder.os, "access", may)
+    with exchanged(folder) as fresh:
+        assert fresh.parent == folder
+        fill(fresh, "new")
+    assert contents(folder) == NEW
+
+
 def test_what_a_killed_run_left_is_cleaned_up(folder):
     """A kill after folders changed places, and one between two moves."""
     left = folder.with_name(".out.ringrig-abc")

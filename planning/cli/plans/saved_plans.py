@@ -4,7 +4,7 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from geometry.arrays import Array
-from planning.cli.output_folder import OWNED, exchanged, uninterrupted
+from planning.cli.output_folder import OWNED, check_ours, exchanged, uninterrupted
 from planning.model.errors import TimeLimitError
 from planning.model.plan import RigPlan
 from planning.model.progress import TIME_IS_UP, Report, Stopwatch, untimed
@@ -30,9 +30,14 @@ class SavedPlans:
         folder: Where they go.
         report: Receives a line before what takes long.
         patterns: Whether the images to project are written too.
+
+    Raises:
+        FileExistsError: If something of another's would have to give way.
     """
 
     def __init__(self, folder: Path, report: Report, *, patterns: bool) -> None:
+        # Before the work, not after it.
+        check_ours(folder)
         self._folder, self._report, self._patterns = folder, report, patterns
         self.last: RigPlan | None = None
         self._errors: dict[str, Array] = {}
