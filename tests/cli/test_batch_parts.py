@@ -233,6 +233,22 @@ def test_two_files_of_one_name_are_two_parts(tmp_path, monkeypatch, begun):
     assert find_parts(given[::-1]) == find_parts(given)
 
 
+def test_a_part_that_is_named_by_itself_is_the_one_of_its_folder(tmp_path):
+    files = ("left/lid.obj", "right/lid.obj", "bracket.obj", "bracket.stl")
+    place = str(made(tmp_path, *(f"parts/{name}" for name in files)) / "parts")
+    whole = find_parts([place])
+    known = {part.name: part.folder for part in whole}
+    for part in whole:
+        (alone,) = find_parts([f"{place}/{part.name}"], known=known)
+        assert (alone.name, alone.folder) == (part.name, part.folder)
+    # Another folder's is another part, and a later file takes nobody's folder.
+    made(tmp_path, "else/lid.obj", "parts/left/lid.stl")
+    (other,) = find_parts([str(tmp_path / "else" / "lid.obj")], known=known)
+    assert (other.name, other.folder) == ("lid.obj", "lid")
+    folders = {part.name: part.folder for part in find_parts([place], known=known)}
+    assert folders == {**known, "left/lid.stl": "left/lid.stl"}
+
+
 def test_files_that_no_folder_tells_apart_are_numbered(tmp_path):
     # The same path in words, another one by a link.
     made(tmp_path, "x.obj", "far/x.obj", "far/in/y.obj")

@@ -154,10 +154,13 @@ def _before(parts: Mapping[str, Part], out: Path) -> dict[str, Row]:
     def holds(row: Row) -> bool:
         if row.part in parts:
             return row.folder in ("", parts[row.part].folder)
-        stands = (out / row.folder / "plan.json").exists()
-        return row.failed or (stands and row.folder not in folders)
+        return row.failed or (_stands(row, out) and row.folder not in folders)
 
     return {name: row for name, row in read_rows(out).items() if holds(row)}
+
+
+def _stands(row: Row, out: Path) -> bool:
+    return (out / row.folder / "plan.json").exists()
 
 
 def batch_command(
@@ -173,7 +176,10 @@ def batch_command(
     # What is wrong with the rig is wrong with every part.
     load_rig(options["rig_name"], options["light"])
     out = Path(options["output"])
-    parts = {part.name: part for part in find_parts(given, out)}
+    stand = {
+        row.part: row.folder for row in read_rows(out).values() if _stands(row, out)
+    }
+    parts = {part.name: part for part in find_parts(given, out, stand)}
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:

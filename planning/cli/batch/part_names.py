@@ -3,7 +3,7 @@
 import os
 import unicodedata
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 
 # Kinds of characters (Unicode's) that end a line, work a terminal, or aren't text.
@@ -65,8 +65,38 @@ def _numbered(names: Sequence[str]) -> Iterator[str]:
         yield one
 
 
-def folders_of(names: Sequence[str]) -> tuple[str, ...]:
-    """Return a folder for each name, none of which is or lies in another one's."""
+def called_before(
+    paths: Sequence[Path], names: Sequence[str], known: Collection[str]
+) -> tuple[str, ...]:
+    """Return the names, with the folders that earlier runs called these files by.
+
+    A file that is named by itself doesn't tell which folder it was a part of.
+    """
+
+    def before(path: Path, name: str) -> str:
+        place = one_line(Path(os.path.abspath(path)).as_posix())
+        longer = (
+            k for k in known if k.endswith(f"/{name}") and place.endswith(f"/{k}")
+        )
+        return max(longer, key=len, default=name)
+
+    called = [before(path, name) for path, name in zip(paths, names, strict=True)]
+    often = Counter(called)
+    return tuple(
+        name if often[one] > 1 else one for one, name in zip(called, names, strict=True)
+    )
+
+
+def folders_of(
+    names: Sequence[str], known: Mapping[str, str] | None = None
+) -> tuple[str, ...]:
+    """Return a folder for each name, none of which is or lies in another one's.
+
+    Args:
+        names: Of parts.
+        known: By names those of earlier runs, which stay where none of these goes.
+    """
+    known = known or {}
     stems = [_folder(name) for name in names]
     often = Counter(map(_key, stems))
     # What holds folders of plans is none itself.
@@ -74,8 +104,9 @@ def folders_of(names: Sequence[str]) -> tuple[str, ...]:
     folders: list[str] = []
     for name, stem in zip(names, stems, strict=True):
         # Two files of one stem are told apart by what follows it.
-        alone = often[_key(stem)] == 1 and _key(stem) not in taken
-        base = stem if alone else _folder(name, whole=True)
+        before, whole = known.get(name), _folder(name, whole=True)
+        alone = before == stem or (often[_key(stem)] == 1 and before != whole)
+        base = stem if alone and _key(stem) not in taken else whole
         folder, again = base, 2
         while _key(folder) in taken:
             folder, again = f"{base}-{again}", again + 1

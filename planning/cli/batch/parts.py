@@ -2,14 +2,14 @@
 
 import glob
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from geometry.files.archives import is_mesh_name
 from planning.model.errors import InputError
 
-from .part_names import folders_of, one_line, told_apart
+from .part_names import called_before, folders_of, one_line, told_apart
 
 
 @dataclass(frozen=True)
@@ -28,13 +28,18 @@ class Part:
     folder: str
 
 
-def find_parts(given: Sequence[str], out: Path | None = None) -> tuple[Part, ...]:
+def find_parts(
+    given: Sequence[str],
+    out: Path | None = None,
+    known: Mapping[str, str] | None = None,
+) -> tuple[Part, ...]:
     """Return the meshes in folders, of patterns, and those named, by their names.
 
     Args:
         given: Folders, patterns and files.
         out: A folder of plans, whose clouds and exports are no parts of a folder
             above it; None: there is none.
+        known: Folders of the plans that stand there, by their parts' names.
 
     Raises:
         InputError: If there are none.
@@ -49,8 +54,9 @@ def find_parts(given: Sequence[str], out: Path | None = None) -> tuple[Part, ...
             f"files"
         )
     names, paths = zip(*sorted(found.values()), strict=True)
-    parts = sorted(zip(told_apart(paths, names), paths, strict=True))
-    folders = folders_of([name for name, _ in parts])
+    called = called_before(paths, told_apart(paths, names), known or {})
+    parts = sorted(zip(called, paths, strict=True))
+    folders = folders_of([name for name, _ in parts], known)
     return tuple(
         Part(path, name, folder)
         for (name, path), folder in zip(parts, folders, strict=True)
