@@ -31,6 +31,8 @@ def _handing(planned: Callable[_Options, RigPlan]) -> Callable[_Options, HandedP
 
     @wraps(planned)
     def handed(*args: _Options.args, **options: _Options.kwargs) -> HandedPlan:
+        for name, value in options.items():
+            options[name] = _plain(value)
         try:
             return HandedPlan.of(planned(*args, **options))
         except RequirementError as error:
@@ -41,6 +43,11 @@ def _handing(planned: Callable[_Options, RigPlan]) -> Callable[_Options, HandedP
             raise InterruptedPlanError(HandedPlan.of(error.plan)) from None
 
     return handed
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401
+    """Return a number of an array as Python's own: plan and rig files take no other."""
+    return value.item() if isinstance(value, np.generic) else value
 
 
 plan_rig = _handing(pipeline.plan_rig)
@@ -118,7 +125,7 @@ def sweep(
     rows: list[Row] = []
     asked = {"cache": Cache.in_memory(), **asked}
     for values in product(*grid.values()):
-        settings = dict(zip(grid, values, strict=True))
+        settings = dict(zip(grid, map(_plain, values), strict=True))
         options = {k: v for k, v in settings.items() if _DOT not in k}
         changed = rig.replace(**_tables(settings))
         if progress is not None:

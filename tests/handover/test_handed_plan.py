@@ -122,6 +122,16 @@ def test_plans_that_are_raised_or_loaded_are_in_this_form(
     assert isinstance(made, RigPlan)
 
 
+def test_numbers_of_arrays_are_plain_in_the_plan(handmade):
+    from planning.handover.planner import _handing
+
+    asked = {}
+    _handing(lambda **options: asked.update(options) or handmade.build_plan())(
+        max_projectors=np.arange(3)[2], coverage=np.float32(0.5), joint=np.False_
+    )
+    assert {type(value) for value in asked.values()} == {int, float, bool}
+
+
 def test_every_error_that_planning_raises_is_exported():
     """But for those that say more of an exported one."""
     known = {name for name in dir(planning) if name.endswith("Error")}
