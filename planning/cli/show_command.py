@@ -36,7 +36,11 @@ def show_command(options: Mapping[str, Any]) -> int:
         print_json(_document(plan, chosen, options["threads"]))
         return 0
     for name in chosen or (names[0], _CAMERAS):
-        click.echo("\n".join(_section(plan, name, options["threads"])))
+        lines = _section(plan, name, options["threads"])
+        if not lines and not options["all"]:
+            lines = [f"{name.upper()}: the plan has nothing of it", ""]
+        if lines:
+            click.echo("\n".join(lines))
     return 0
 
 

@@ -155,6 +155,8 @@ def test_every_section_has_a_heading_and_a_sentence(plan, handmade, tmp_path, ca
         assert ("\n".join(told) in every) == bool(section.lines(plan))
     assert show_command(asked | wanted | {"proofs": True}) == 0
     assert capsys.readouterr().out.startswith("PROOFS: ")
+    assert show_command(asked | wanted | {"family": True}) == 0
+    assert capsys.readouterr().out == "FAMILY: the plan has nothing of it\n\n"
 
 
 def test_a_bar_shows_stage_percent_and_time_and_is_gone_in_the_end():
