@@ -88,7 +88,8 @@ def test_over_a_plate_a_disc_is_lit_and_a_lens_of_two_discs_measured(folder):
     text = summary(plan, (), shortfalls(plan))
     assert text.startswith(f"AS BUILT 1 projector, 1 camera of {folder / 'two.csv'}")
     assert "nothing is proved of their number" in text
-    assert "two.csv` keeps these and seeks more projectors" in text
+    asked = "two.csv --max-projectors 2`, mesh and rig as here, keeps these and seeks"
+    assert f"{asked} more projectors" in text
     for claim in ("PROVED", "fewest", "MARGINAL", "ROUTES"):
         assert claim not in text
 

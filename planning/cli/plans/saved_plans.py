@@ -8,6 +8,7 @@ from planning.cli.output_folder import OWNED, check_ours, exchanged, uninterrupt
 from planning.model.errors import TimeLimitError
 from planning.model.plan import RigPlan
 from planning.model.progress import TIME_IS_UP, Report, Stopwatch, untimed
+from planning.model.words import shell_word
 from planning.report.drawing.face_colours import face_status
 from planning.report.drawing.picture_view import save_picture
 from planning.report.drawing.rig_picture import draw_rig
@@ -82,8 +83,8 @@ class SavedPlans:
                         shown, path, threads=threads, error_m=error_m, linked=True
                     )
             except TIME_IS_UP:
-                folder = path.parent
-                self._report(f"no time for {path}: `plan report {folder}` writes it")
+                word = shell_word(path.parent)
+                self._report(f"no time for {path}: `plan report {word}` writes it")
 
     def finish(self, plan: RigPlan, clock: Stopwatch) -> RigPlan:
         """Save how a run ended, and return the plan that stands in the folder.

@@ -3,7 +3,7 @@
 import math
 
 from planning.model.document.plan_document import PlanDocument
-from planning.model.words import area_words, percent
+from planning.model.words import area_words, percent, shell_word
 from planning.scene.limits.limit import causes
 from planning.scene.limits.pair_limits import MEASURED_LIMITS
 from planning.scene.limits.projector_limits import PROJECTOR_LIMITS
@@ -74,3 +74,15 @@ def leaving_out_inside(document: PlanDocument) -> tuple[str, ...]:
     if document.faces_chosen_by != "curvature" or inside <= _MOST * dark:
         return ()
     return ("--target outside leaves out all that lies inside",)
+
+
+def beside_these(document: PlanDocument, kind: str) -> str:
+    """Return what seeks more `projectors` or `cameras` than an evaluation's."""
+    evaluation, allowed = document.evaluation, len(document.projectors)
+    path = "" if evaluation is None else evaluation.path
+    most = f" --max-projectors {allowed + (kind == 'projectors')}"
+    most = "" if document.requirements.pattern == "none" else most
+    return (
+        f"`plan --fixed {shell_word(path)}{most}`, mesh and rig as here, keeps these "
+        f"and seeks more {kind}"
+    )

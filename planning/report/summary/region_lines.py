@@ -13,7 +13,7 @@ from planning.model.words import area_words, count_words, labelled, percent
 from planning.scene.limits.limit import causes
 from planning.scene.limits.projector_limits import PROJECTOR_LIMITS
 
-from .cause_words import areas_line, rounded_down
+from .cause_words import areas_line, beside_these, rounded_down
 
 _AXES = "xyz"
 # Directions are named by axes that have at least this part of their length.
@@ -146,9 +146,8 @@ def floor_shortfalls(plan: RigPlan) -> Iterator[tuple[str, str, tuple[str, ...]]
 
 
 def _remedies(plan: RigPlan, areas: RegionCoverage, kind: str) -> Iterator[str]:
-    evaluation = plan.document.evaluation
-    if evaluation is not None:
-        yield f"`plan --fixed {evaluation.path}` keeps these and seeks more {kind}"
+    if plan.document.evaluation is not None:
+        yield beside_these(plan.document, kind)
     else:
         allowed = getattr(plan.requirements, f"max_{kind}")
         proof = getattr(plan.document.certificates, kind)

@@ -21,6 +21,7 @@ from planning.report.tolerance.survival_lines import (
 
 from .cause_words import (
     areas_line,
+    beside_these,
     causes_left,
     causes_line,
     inside_words,
@@ -273,12 +274,12 @@ def _remedies(
     # What a member takes alone needn't do for all.
     of_all: FamilyCount | None = None if family is None else getattr(family, kind)
     enough = needed.count if of_all is None else of_all.needed
-    evaluation, allowed = document.evaluation, getattr(requirements, f"max_{kind}")
+    allowed = getattr(requirements, f"max_{kind}")
     option = "dominant-coverage" if kind == "projectors" else "coverage"
     accept = f"--{option} {rounded_down(share)} accepts this plan"
-    if evaluation is not None:
+    if document.evaluation is not None:
         # A share of 0 is none that an option takes.
-        more = f"`plan --fixed {evaluation.path}` keeps these and seeks more {kind}"
+        more = beside_these(document, kind)
         return (more, f"or {accept}") if share > 0.0 else (more,)
     if gone := used_up(document, kind.removesuffix("s")):
         of_any = f"with any number of each {enough} would do"
