@@ -10,6 +10,7 @@ import numpy as np
 
 from geometry.mesh.mesh import TriangleMesh
 from planning.model.plan import RigPlan
+from planning.model.words import shell_word
 from planning.verify.audit.proofs.poses.pose_claims import PoseBound
 
 from .held_figures import EXACTLY, WHOLLY
@@ -189,7 +190,8 @@ def _of_mesh(plan: RigPlan, mesh: TriangleMesh | None) -> tuple[str, ...]:
     """Return what of the mesh file was believed, a line each."""
     record, planned = plan.document.meshes[0], plan.surface.mesh
     if mesh is None:
-        return (_OF_FILE.format(path=record.path or "FILE"),)
+        path = shell_word(record.path) if record.path else "FILE"
+        return (_OF_FILE.format(path=path),)
     x, y, z = 1e3 * np.ptp(mesh.bounds, axis=0)
     unit = (
         f"the unit of the mesh file, {record.unit} by the plan, in which it is "

@@ -105,6 +105,14 @@ def named(plan, claims_held, figures_held):
     return "\n".join(taken_on_trust(plan, None, claims_held, figures_held))
 
 
+def test_a_mesh_to_give_is_named_as_a_command_takes_it(handmade):
+    plan = handmade.tampered(
+        handmade.build_plan(), lambda d: d["meshes"][0].update(path="my parts/lid.obj")
+    )
+    lines = taken_on_trust(plan, None, EXACTLY, EXACTLY)
+    assert any(line.endswith("give --mesh 'my parts/lid.obj'") for line in lines)
+
+
 @pytest.mark.parametrize(
     "key",
     [
