@@ -17,6 +17,11 @@ def _page(name):
     return (DOCS / name).read_text(encoding="utf-8")
 
 
+def test_the_first_page_names_every_page():
+    named = set(re.findall(r"\]\(([\w/-]+\.md)\)", _page("README.md")))
+    assert {page.relative_to(DOCS).as_posix() for page in DOCS.glob("*/*.md")} <= named
+
+
 def test_command_reference_is_what_help_says():
     # In a process of its own: click keeps a command's first `--help`, whoever asked.
     check = ["-m", "benchmarks.house.command_reference", "--check"]
