@@ -1,7 +1,6 @@
 """What frames are exposed for, and how bright the plainest extremes come out."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planning.model.devices.planned import PlannedProjector
 from planning.model.document.device_records import ExposureRecord, GreySample
@@ -19,8 +18,6 @@ from planning.scene.limits.light_terms import electrons
 from planning.scene.limits.projector_limits import LIT
 from planning.scene.samples import Target
 from planning.scene.scene import Scene
-
-_Array = NDArray[np.float64]
 
 
 def exposure_records(

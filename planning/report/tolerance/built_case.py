@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,6 @@ from planning.model.devices.calibration_errors import (
     CalibrationErrors,
     Mounting,
 )
-from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.plan import RigPlan
 from planning.report.claims.judged import Judged
 from planning.report.written_plan import written_devices, written_scene
@@ -33,7 +31,6 @@ from .retriangulation import retriangulated
 
 _Array = NDArray[np.float64]
 _Mask = NDArray[np.bool_]
-_D = TypeVar("_D", PlannedProjector, PlannedCamera)
 
 
 @dataclass(frozen=True, eq=False)
