@@ -1,6 +1,7 @@
 """What a plan predicts of the standard deviation of its points."""
 
 from dataclasses import replace
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from support.plain_shapes import box
 from planning import RequirementError, RigPlan, load_rig, plan_rig, verify_plan
 from planning.report.summary.coverage_lines import coverage_lines
 from planning.report.summary.light_lines import light_lines
-from planning.scene.limits.pair_quality import TERMS
+from planning.scene.limits.pair_quality import Term
 from planning.verify.audit.audit import audit_plan
 from planning.verify.audit.audit_case import AuditCase, examine
 from planning.verify.audit.audit_findings import AuditFindings
@@ -99,7 +100,7 @@ def test_a_check_in_the_light_that_the_rig_states_is_held_to_that(plan):
 
 FIGURES = [
     *(("median_m",), ("p95_m",), ("noise_median_m",), ("noise_p95_m",)),
-    *(("terms_rms_m", term) for term in TERMS if term != "phase"),
+    *(("terms_rms_m", term) for term in get_args(Term) if term != "phase"),
 ]
 
 
@@ -135,7 +136,7 @@ def test_terms_that_the_limits_lack_or_have_beside_are_found(failures):
 
 def test_terms_add_up_and_the_limit_is_of_all(plan):
     sigma = plan.coverage.sigma
-    assert set(sigma.terms_rms_m) == set(TERMS) - {"phase"}
+    assert set(sigma.terms_rms_m) == set(get_args(Term)) - {"phase"}
     assert sigma.noise_median_m < sigma.median_m
     assert sigma.noise_p95_m < sigma.p95_m
     assert sigma.p95_m <= plan.requirements.triangulation.max_sigma_m

@@ -1,7 +1,7 @@
 """What limits of pairs look at: of samples, and of what a cell of poses may have."""
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from .limit import Array
 # Of noise in the image, as stated and by the light, of misplaced rings, of the phase
 # and of the panel's pixels, s_N; of the calibration, s_C.
 Term = Literal["edges", "light", "phase", "rings", "linearity", "camera", "projector"]
-TERMS: tuple[Term, ...] = get_args(Term)
 NOISE_TERMS: tuple[Term, ...] = ("edges", "light", "phase", "rings", "linearity")
 
 
@@ -25,7 +24,7 @@ class PairQuality:
     Attributes:
         conditioning: |r.m|, shape (n,).
         sigma: What `max_sigma_m` limits: s_N, or sqrt(s_N^2 + s_C^2) [m], shape (n,).
-        terms: Independent parts of the deviation along the normal by `TERMS` [m], (n,)
+        terms: Independent parts of the deviation along the normal by `Term` [m], (n,)
             each; what is stated of none of them is absent.
         pitch: Distance of neighbouring rings in the image in [px], shape (n,).
         view: How the camera sees them: it stands at -t r from a sample.
