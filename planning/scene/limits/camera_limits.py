@@ -26,8 +26,8 @@ from .limit import (
     causes,
     off_axis,
     range_ends,
-    to_digits,
     to_step,
+    to_three_digits,
     wider_angle,
 )
 
@@ -156,11 +156,11 @@ class CameraRange(InRange):
             stopped = focus.f_number * value / focus.blur_px
             return (
                 f"camera.focus.blur_px = {value:.3g} (now {focus.blur_px:g}) or "
-                f"camera.focus.f_number = {to_digits(3)(np.array(stopped)):.3g} "
+                f"camera.focus.f_number = {to_three_digits(np.array(stopped)):.3g} "
                 f"(now {focus.f_number:g})"
             )
 
-        yield LimitRelaxation(self.name, ask, to_digits(3), say)
+        yield LimitRelaxation(self.name, ask, to_three_digits, say)
         # Ends that the focus sets move only with it.
         yield from range_ends(self.name, "camera", allowed, sharp)
 
@@ -212,7 +212,7 @@ class SampleDistance(Limit[CameraRays, CellView, CameraLimits]):
         yield LimitRelaxation(
             self.name,
             lambda view: 1e3 * view.sample_distance,
-            to_digits(3),
+            to_three_digits,
             lambda value: (
                 f"limits.max_sample_distance_mm = {value:.3g} (now {1e3 * limit:g})"
             ),

@@ -7,7 +7,7 @@ import numpy as np
 from planning.model.light.light_budget import SATURATED
 from planning.model.requirements import TriangulationLimits
 
-from .limit import Array, Limit, LimitRelaxation, Mask, RigFacts, to_digits
+from .limit import Array, Limit, LimitRelaxation, Mask, RigFacts, to_three_digits
 from .pair_quality import PairCell, PairQuality
 
 # More or less light by more than this is another rig.
@@ -40,7 +40,7 @@ class TooDark(Limit[PairQuality, PairCell, TriangulationLimits]):
         yield LimitRelaxation(
             self.name,
             lambda pair: _within(least / np.maximum(pair.grey.contrast, 1e-9)),
-            to_digits(3),
+            to_three_digits,
             lambda times: (
                 f"photometry.lumens = {times * lumens:.4g} (now {lumens:g}), "
                 f"camera.focus.f_number = {number / times**0.5:.3g} (now {number:g}) "
@@ -69,7 +69,7 @@ class Clipped(Limit[PairQuality, PairCell, TriangulationLimits]):
         yield LimitRelaxation(
             self.name,
             lambda pair: _within(pair.grey.white / SATURATED),
-            to_digits(3),
+            to_three_digits,
             lambda times: (
                 f"camera.focus.f_number = {number * times**0.5:.3g} (now {number:g}) "
                 f"or photometry.lumens = {lumens / times:.4g} (now {lumens:g})"

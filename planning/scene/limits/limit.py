@@ -238,14 +238,10 @@ def to_step(step: float) -> Callable[[Array], Array]:
     return lambda values: np.ceil(values / step - 1e-9) * step
 
 
-def to_digits(digits: int) -> Callable[[Array], Array]:
-    """Return what rounds positive values up to so many significant digits."""
-
-    def rounded(values: Array) -> Array:
-        step = 10.0 ** (np.floor(np.log10(np.maximum(values, 1e-30))) - digits + 1)
-        return np.ceil(values / step - 1e-9) * step
-
-    return rounded
+def to_three_digits(values: Array) -> Array:
+    """Round positive values up to three significant digits."""
+    step = 10.0 ** (np.floor(np.log10(np.maximum(values, 1e-30))) - 2.0)
+    return np.ceil(values / step - 1e-9) * step
 
 
 def off_axis(device: DeviceModel, local: Array) -> Array:

@@ -20,8 +20,8 @@ from .limit import (
     Mask,
     RigFacts,
     causes,
-    to_digits,
     to_step,
+    to_three_digits,
 )
 from .pair_quality import PairCell, PairQuality
 
@@ -84,7 +84,7 @@ class Sigma(Limit[PairQuality, PairCell, TriangulationLimits]):
         yield LimitRelaxation(
             self.name,
             lambda pair: 1e3 * pair.sigma,
-            to_digits(3),
+            to_three_digits,
             lambda value: f"--accuracy {value:.3g} (now {1e3 * limit:g} mm)",
         )
 
@@ -116,7 +116,7 @@ class Pitch(Limit[PairQuality, PairCell, TriangulationLimits]):
         yield LimitRelaxation(
             self.name,
             lambda pair: 1e3 * gap * least / np.maximum(pair.pitch, 1e-12),
-            to_digits(3),
+            to_three_digits,
             lambda value: f"rings.gap_mm = {value:.3g} (now {1e3 * gap:.3g}{chosen})",
         )
         if facts.ring_gap_chosen:

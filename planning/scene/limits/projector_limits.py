@@ -28,8 +28,8 @@ from .limit import (
     degrees,
     off_axis,
     range_ends,
-    to_digits,
     to_step,
+    to_three_digits,
     wider_angle,
 )
 
@@ -182,7 +182,7 @@ class PixelDistance(Limit[ProjectorView, object, ProjectorLimits]):
         yield LimitRelaxation(
             self.name,
             lambda view: 1e3 * _pixel_distance(view),
-            to_digits(3),
+            to_three_digits,
             lambda value: (
                 f"limits.max_sample_distance_mm = {value:.3g} (now {1e3 * limit:g})"
             ),

@@ -16,8 +16,8 @@ from .limit import (
     RigFacts,
     causes,
     degrees,
-    to_digits,
     to_step,
+    to_three_digits,
 )
 
 # Below this no limit is worth relaxing: first-order errors hold no longer [degrees].
@@ -101,7 +101,7 @@ class ViewSigma(Limit[MetRays, Any, TriangulationLimits]):
         yield LimitRelaxation(
             self.name,
             lambda pair: 1e3 * pair.sigma,
-            to_digits(3),
+            to_three_digits,
             lambda value: f"--accuracy {value:.3g} (now {1e3 * limit:g} mm)",
         )
 
