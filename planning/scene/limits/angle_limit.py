@@ -1,13 +1,14 @@
 """At which angles ray and light, or two rays, may meet."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 
 from planning.model.requirements import TriangulationLimits
 
 from .camera_limits import ROUNDING
-from .limit import Array, Limit, LimitRelaxation, Mask, RigFacts, to_step
+from .limit import Array, Limit, LimitRelaxation, Mask, RigFacts, degrees, to_step
 from .pair_quality import PairCell, PairQuality
 
 # Beyond it no least angle is worth relaxing: first-order errors hold no longer [deg].
@@ -38,29 +39,36 @@ class Angle(Limit[PairQuality, PairCell, TriangulationLimits]):
         """Yield a smaller least angle, and a larger largest one; of rings neither."""
         if facts.required.pattern == "rings":
             return
-        low, high = facts.required.triangulation.angles
 
-        def met(pair: PairQuality) -> Array:
-            cosine = np.ones(0) if pair.light_cos is None else pair.light_cos
-            return np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+        def cosines(pair: PairQuality) -> Array:
+            return np.ones(0) if pair.light_cos is None else pair.light_cos
 
-        yield LimitRelaxation(
-            self.name,
-            lambda pair: np.where(
-                (met(pair) >= _LEAST_ANGLE) & (met(pair) < np.degrees(low)),
-                -met(pair),
-                np.inf,
-            ),
-            to_step(1.0),
-            lambda value: (
-                f"limits.min_angle_deg = {-value:.0f} (now {np.degrees(low):g})"
-            ),
-        )
-        yield LimitRelaxation(
-            self.name,
-            lambda pair: np.where(met(pair) > np.degrees(high), met(pair), np.inf),
-            to_step(1.0),
-            lambda value: (
-                f"limits.max_angle_deg = {value:.0f} (now {np.degrees(high):g})"
-            ),
-        )
+        yield from wider_angles(self.name, facts, cosines)
+
+
+def wider_angles(
+    name: str, facts: RigFacts, cosines: Callable[[Any], Array]
+) -> Iterator[LimitRelaxation]:
+    """Yield a smaller least angle and a larger largest one, by a view's cosines."""
+    low, high = np.degrees(facts.required.triangulation.angles)
+
+    def smaller(view: object) -> Array:
+        met = degrees(cosines(view))
+        return np.where((met >= _LEAST_ANGLE) & (met < low), -met, np.inf)
+
+    def larger(view: object) -> Array:
+        met = degrees(cosines(view))
+        return np.where(met > high, met, np.inf)
+
+    yield LimitRelaxation(
+        name,
+        smaller,
+        to_step(1.0),
+        lambda value: f"limits.min_angle_deg = {-value:.0f} (now {low:g})",
+    )
+    yield LimitRelaxation(
+        name,
+        larger,
+        to_step(1.0),
+        lambda value: f"limits.max_angle_deg = {value:.0f} (now {high:g})",
+    )

@@ -24,6 +24,7 @@ from .limit import (
     to_three_digits,
 )
 from .pair_quality import PairCell, PairQuality
+from .sigma_limit import MaxSigma
 
 # Beyond these no limit is worth relaxing: first-order errors hold no longer.
 _LEAST_CONDITIONING = 0.03
@@ -57,16 +58,11 @@ class Conditioning(Limit[PairQuality, PairCell, TriangulationLimits]):
         )
 
 
-class Sigma(Limit[PairQuality, PairCell, TriangulationLimits]):
-    """s_N, or with the calibration's s_C sqrt(s_N^2 + s_C^2), <= max_sigma."""
+class Sigma(MaxSigma):
+    """By a projector and a camera."""
 
     name = "sigma"
     words = "measured with too large a deviation"
-
-    def holds(self, view: PairQuality, rules: TriangulationLimits) -> Mask | None:
-        """Return which samples are measured exactly enough."""
-        limit = rules.max_sigma_m
-        return None if limit is None else view.sigma <= limit
 
     def may_hold(self, cell: PairCell, rules: TriangulationLimits) -> Mask | None:
         """Return which may be, from the least of each term that a cell leaves."""
@@ -75,18 +71,6 @@ class Sigma(Limit[PairQuality, PairCell, TriangulationLimits]):
             return None
         edge = np.hypot(cell.noise * cell.shift, cell.placement) * (1.0 - ROUNDING)
         return edge <= limit * np.maximum(cell.conditioning, 1e-12)
-
-    def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:
-        """Yield a larger deviation."""
-        limit = facts.required.triangulation.max_sigma_m
-        if limit is None:
-            return
-        yield LimitRelaxation(
-            self.name,
-            lambda pair: 1e3 * pair.sigma,
-            to_three_digits,
-            lambda value: f"--accuracy {value:.3g} (now {1e3 * limit:g} mm)",
-        )
 
 
 class Pitch(Limit[PairQuality, PairCell, TriangulationLimits]):

@@ -7,21 +7,10 @@ import numpy as np
 
 from planning.model.requirements import TriangulationLimits
 
+from .angle_limit import wider_angles
 from .camera_limits import SEEN_CAUSES
-from .limit import (
-    Array,
-    Limit,
-    LimitRelaxation,
-    Mask,
-    RigFacts,
-    causes,
-    degrees,
-    to_step,
-    to_three_digits,
-)
-
-# Below this no limit is worth relaxing: first-order errors hold no longer [degrees].
-_LEAST_ANGLE = 3.0
+from .limit import Array, Limit, LimitRelaxation, Mask, RigFacts, causes
+from .sigma_limit import MaxSigma
 
 
 class MetRays(Protocol):
@@ -30,11 +19,6 @@ class MetRays(Protocol):
     @property
     def cosine(self) -> Array:
         """Of the angle at which they meet, shape (n,)."""
-        ...
-
-    @property
-    def sigma(self) -> Array:
-        """Deviation along the normal [m], shape (n,)."""
         ...
 
 
@@ -61,49 +45,14 @@ class ViewAngle(Limit[MetRays, Any, TriangulationLimits]):
 
     def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:
         """Yield a smaller least angle, and a larger largest one."""
-        low, high = np.degrees(facts.required.triangulation.angles)
-        yield LimitRelaxation(
-            self.name,
-            lambda pair: np.where(
-                (degrees(pair.cosine) >= _LEAST_ANGLE) & (degrees(pair.cosine) < low),
-                -degrees(pair.cosine),
-                np.inf,
-            ),
-            to_step(1.0),
-            lambda value: f"limits.min_angle_deg = {-value:.0f} (now {low:g})",
-        )
-        yield LimitRelaxation(
-            self.name,
-            lambda pair: np.where(
-                degrees(pair.cosine) > high, degrees(pair.cosine), np.inf
-            ),
-            to_step(1.0),
-            lambda value: f"limits.max_angle_deg = {value:.0f} (now {high:g})",
-        )
+        yield from wider_angles(self.name, facts, lambda pair: pair.cosine)
 
 
-class ViewSigma(Limit[MetRays, Any, TriangulationLimits]):
-    """s_N, or with the calibration's s_C sqrt(s_N^2 + s_C^2), <= max_sigma."""
+class ViewSigma(MaxSigma):
+    """By two cameras."""
 
     name = "view_sigma"
     words = "measured by cameras with too large a deviation"
-
-    def holds(self, view: MetRays, rules: TriangulationLimits) -> Mask | None:
-        """Return which samples are measured exactly enough."""
-        limit = rules.max_sigma_m
-        return None if limit is None else view.sigma <= limit
-
-    def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:
-        """Yield a larger deviation."""
-        limit = facts.required.triangulation.max_sigma_m
-        if limit is None:
-            return
-        yield LimitRelaxation(
-            self.name,
-            lambda pair: 1e3 * pair.sigma,
-            to_three_digits,
-            lambda value: f"--accuracy {value:.3g} (now {1e3 * limit:g} mm)",
-        )
 
 
 VIEW_PAIR_LIMITS: tuple[Limit[Any, Any, TriangulationLimits], ...] = (
