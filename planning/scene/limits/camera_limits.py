@@ -24,6 +24,7 @@ from .limit import (
     Mask,
     RigFacts,
     causes,
+    coarser,
     off_axis,
     range_ends,
     to_step,
@@ -207,16 +208,7 @@ class SampleDistance(Limit[CameraRays, CellView, CameraLimits]):
     def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:
         """Yield a larger distance."""
         limit = facts.required.camera.max_sample_distance_m
-        if limit is None:
-            return
-        yield LimitRelaxation(
-            self.name,
-            lambda view: 1e3 * view.sample_distance,
-            to_three_digits,
-            lambda value: (
-                f"limits.max_sample_distance_mm = {value:.3g} (now {1e3 * limit:g})"
-            ),
-        )
+        yield from coarser(self.name, limit, lambda view: view.sample_distance)
 
 
 CAMERA_LIMITS: tuple[Limit[Any, Any, Any], ...] = (

@@ -144,6 +144,21 @@ def wider_angle(
     )
 
 
+def coarser(
+    name: str, limit: float | None, distances: Callable[[Any], Array]
+) -> Iterator[LimitRelaxation]:
+    """Yield a larger distance of pixels on the surface than the limit [m], if any."""
+    if limit is not None:
+        yield LimitRelaxation(
+            name,
+            lambda view: 1e3 * distances(view),
+            to_three_digits,
+            lambda value: (
+                f"limits.max_sample_distance_mm = {value:.3g} (now {1e3 * limit:g})"
+            ),
+        )
+
+
 def causes(limits: Sequence[Limit[Any, Any, Any]]) -> tuple[str, ...]:
     """Return the names of limits."""
     return tuple(limit.name for limit in limits)

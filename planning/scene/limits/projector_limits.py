@@ -25,11 +25,11 @@ from .limit import (
     Mask,
     RigFacts,
     causes,
+    coarser,
     degrees,
     off_axis,
     range_ends,
     to_step,
-    to_three_digits,
     wider_angle,
 )
 
@@ -177,16 +177,7 @@ class PixelDistance(Limit[ProjectorView, object, ProjectorLimits]):
     def relaxations(self, facts: RigFacts) -> Iterator[LimitRelaxation]:
         """Yield a larger distance."""
         limit = facts.required.projector.max_sample_distance_m
-        if limit is None:
-            return
-        yield LimitRelaxation(
-            self.name,
-            lambda view: 1e3 * _pixel_distance(view),
-            to_three_digits,
-            lambda value: (
-                f"limits.max_sample_distance_mm = {value:.3g} (now {1e3 * limit:g})"
-            ),
-        )
+        yield from coarser(self.name, limit, _pixel_distance)
 
 
 def _pixel_distance(view: ProjectorView) -> Array:
