@@ -73,20 +73,17 @@ class FoundHeads:
         return tuple(self.heads[k] for k in self.chosen)
 
 
-def fewest_heads(
-    source: HeadSource, n: int, most: int, *, least: int = 1
-) -> FoundHeads:
+def fewest_heads(source: HeadSource, n: int, most: int) -> FoundHeads:
     """Return the fewest heads of about n poses and of others close around.
 
     Args:
         source: Gives poses.
         n: Poses of the lattice.
         most: Heads allowed.
-        least: So many are needed anyway; no fewer are looked for.
     """
     scene, heads = source.scene, source.over(n)
     sets = HeadSets.of(scene, heads, scene.target_samples(DRAWS.cameras))
-    heads, sets, known = _with_better(source, heads, sets, n, least)
+    heads, sets, known = _with_better(source, heads, sets, n)
     fewest = _fewest_of(source, heads, sets, most, known)
     fresh = _fresh(source, heads, 0)
     for draw in range(_ROUNDS):
@@ -119,11 +116,7 @@ class _Fewest(NamedTuple):
 
 
 def _with_better(
-    source: HeadSource,
-    heads: tuple[PlacedHead, ...],
-    sets: HeadSets,
-    n: int,
-    least: int,
+    source: HeadSource, heads: tuple[PlacedHead, ...], sets: HeadSets, n: int
 ) -> tuple[tuple[PlacedHead, ...], HeadSets, Ints]:
     """Return heads, and others around them as long as those save one.
 
@@ -131,7 +124,7 @@ def _with_better(
     """
     cover, known = HeadCover.of(source.scene, sets), np.empty(0, dtype=np.int64)
     chosen, _ = cover.fewest(seed=source.scene.seed, budget=_BUDGET)
-    for count in range(len(chosen) - 1, max(least, 1) - 1, -1):
+    for count in range(len(chosen) - 1, 0, -1):
         moved = _moved_together(source, heads, cover, n, count)
         if moved is None:
             break
