@@ -32,7 +32,7 @@ from solvers.status import SolveStatus
 from .axis_problem import PITCH_POWER, AxisProgram
 from .compiled import local_status
 
-_ROUNDS = 10
+_ROUNDS, _ITERATIONS = 10, 100
 # Of a round, in units of the largest ring.
 _REACH = 0.5
 _SHRINK = 0.3
@@ -118,7 +118,7 @@ def axis_slack(program: AxisProgram, axis: NDArray[np.float64]) -> NDArray[np.fl
     return (u @ axis_direction(axis) * np.hypot(1.0, radius) - 1.0) / radius**2
 
 
-def solve_axis(program: AxisProgram, *, max_iterations: int = 100) -> AxisSolution:
+def solve_axis(program: AxisProgram) -> AxisSolution:
     """Move an axis to where cameras measure most, near its start; never a worse one."""
     from .axis_nlp import run_ipopt
 
@@ -129,7 +129,7 @@ def solve_axis(program: AxisProgram, *, max_iterations: int = 100) -> AxisSoluti
         pairs = _assigned(program, best)
         if pairs.size == 0:
             break
-        outcome = run_ipopt(program, pairs, binding, best, reach, max_iterations)
+        outcome = run_ipopt(program, pairs, binding, best, reach, _ITERATIONS)
         axis = program.ring_radius * outcome.x
         if not np.all(np.isfinite(axis)):
             break

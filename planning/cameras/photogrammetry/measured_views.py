@@ -94,19 +94,17 @@ def view_pairs(
 
 
 def measured_views(
-    scene: Scene,
-    cameras: Sequence[PlannedCamera],
-    target: Target,
-    views: Sequence[CameraView] | None = None,
+    scene: Scene, cameras: Sequence[PlannedCamera], target: Target
 ) -> MeasuredViews:
-    """Return what cameras measure of samples; `views` where they are at hand.
+    """Return what cameras measure of samples.
 
     A sample is measured where `views_of` cameras see it, and some pair of them keeps
     the limits of angle and deviation.
     """
-    views = camera_views(scene, cameras, target) if views is None else views
     n, m, least = len(target), len(cameras), views_of(scene.requirements)
-    sightings = Sightings.of(views, target.samples.normals)
+    sightings = Sightings.of(
+        camera_views(scene, cameras, target), target.samples.normals
+    )
     seen = np.zeros((n, m), dtype=bool)
     seen[sightings.sample, sightings.camera] = True
     furthest = np.full(n, FEW_VIEWS, dtype=np.int8)

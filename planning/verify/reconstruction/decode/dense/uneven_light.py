@@ -21,12 +21,10 @@ MOST_PX = 0.3
 UNSURE = 0.3
 
 
-def places_lit(contrast: Grey, blur_px: float = CAMERA_PX) -> Grey:
+def places_lit(contrast: Grey) -> Grey:
     """Return how far aside of its centre each pixel looks, along u and v, (h, w, 2).
 
-    Args:
-        contrast: Light of white over black, shape (h, w).
-        blur_px: s, of the camera's lens and its pixels.
+    `contrast` is the light of white over black, shape (h, w); s is `CAMERA_PX`.
     """
     light = np.maximum(contrast, np.float32(1.0))
     aside: list[Grey] = []
@@ -34,7 +32,7 @@ def places_lit(contrast: Grey, blur_px: float = CAMERA_PX) -> Grey:
         # Across, neighbours are averaged: noise counts for less.
         level = np.empty_like(light)
         convolve1d(light, np.array([0.25, 0.5, 0.25]), axis=1 - axis, output=level)
-        slope = np.float32(blur_px**2) * _slope(level, axis) / level
+        slope = np.float32(CAMERA_PX**2) * _slope(level, axis) / level
         aside.append(slope.astype(np.float32))
     return np.stack(aside, axis=-1)
 
