@@ -41,10 +41,10 @@ class PositionTree(GrownTree):
         points: Samples in [m], shape (n_rows, 3).
         maps: Directions that are open to each sample, widened; None: all are.
         finest: Level beyond which directions aren't split.
-        closed: Directions that aren't, widened: where none is near, parts of a cell
-            need no look. None: all are looked at.
-        limits: What else forbids samples; None: nothing.
-        threads: That look at cells; None: one for each core.
+        limits: What else forbids samples.
+        threads: That look at cells.
+        closed: Directions that aren't open, widened: where none is near, parts of a
+            cell need no look. None: all are looked at.
     """
 
     def __init__(
@@ -56,9 +56,9 @@ class PositionTree(GrownTree):
         maps: WidenedMaps | None,
         *,
         finest: int,
+        limits: CellLimits | LitCells,
+        threads: int,
         closed: WidenedMaps | None = None,
-        limits: CellLimits | LitCells | None = None,
-        threads: int | None = None,
     ) -> None:
         self._workspace, self._range = workspace, range_m
         self._points = np.asfortranarray(points - np.array(workspace.centre))
@@ -163,7 +163,7 @@ class PositionTree(GrownTree):
             may, surely = self._limits.admitted(samples[pairs], view.towards, view.psi)
             sure[pairs] &= surely
             pairs = pairs[may]
-        elif self._limits is not None:
+        else:
             view = seen.take(pairs)
             least = np.maximum(nearest[pairs], 0.0)
             may = self._limits.admits(samples[pairs], view.towards, least, view.psi)
