@@ -66,7 +66,7 @@ def read_gltf(text: bytes, fetch: Fetch | None, stored: bytes | None = None) -> 
         mesh = item(tree, "meshes", index)
         _check_rigid(node, mesh)
         if index not in meshes:
-            shapes = [_primitive(tree, buffers, p) for p in mesh["primitives"]]
+            shapes = [_primitive(buffers, p) for p in mesh["primitives"]]
             meshes[index] = [shape for shape in shapes if shape is not None]
         units.add(_unit(mesh))
         parts += [ScenePart(v, f, world_from_node) for v, f in meshes[index]]
@@ -147,9 +147,7 @@ def _check_rigid(node: Tree, mesh: Tree) -> None:
         raise FormatError("EXT_mesh_gpu_instancing repeats its mesh, which isn't read")
 
 
-def _primitive(
-    tree: Tree, buffers: "Buffers", primitive: Tree
-) -> tuple[Array, Ints] | None:
+def _primitive(buffers: "Buffers", primitive: Tree) -> tuple[Array, Ints] | None:
     mode = primitive.get("mode", _TRIANGLES)
     if mode in (0, 1, 2, 3):
         return None

@@ -41,7 +41,7 @@ def containers(
     spots = spots_on(mesh, 0, group=patch, least=least, within=inner[patch])
     pairs = np.concatenate(
         [
-            _spots_inside(mesh, patch, spots.take(part), n, caster)
+            _spots_inside(patch, spots.take(part), n, caster)
             for part in equal_parts(len(spots), _CHUNK)
         ]
     )
@@ -74,14 +74,12 @@ def _in_some_box(mesh: TriangleMesh, patch: Ints, holding: Mask, asked: Mask) ->
     return inside
 
 
-def _spots_inside(
-    mesh: TriangleMesh, patch: Ints, spots: Spots, n: int, caster: RayCaster
-) -> Ints:
+def _spots_inside(patch: Ints, spots: Spots, n: int, caster: RayCaster) -> Ints:
     """Keys ``own patch * n + other`` for each spot that lies inside the other."""
     votes: list[Ints] = []
     for direction in fibonacci_cap(3, np.array([0.31, 0.52, 0.8]), 1.2):
         keys, crossed = np.unique(
-            _crossings(mesh, patch, spots.points, direction, n, caster),
+            _crossings(patch, spots.points, direction, n, caster),
             return_counts=True,
         )
         votes.append(keys[crossed % 2 == 1])
@@ -91,12 +89,7 @@ def _spots_inside(
 
 
 def _crossings(
-    mesh: TriangleMesh,
-    patch: Ints,
-    points: Array,
-    direction: Array,
-    n: int,
-    caster: RayCaster,
+    patch: Ints, points: Array, direction: Array, n: int, caster: RayCaster
 ) -> Ints:
     """One key ``point * n + patch`` for each wall that the ray of a point meets."""
     step = _STEP * caster.extent

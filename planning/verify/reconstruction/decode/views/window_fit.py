@@ -94,7 +94,7 @@ class WindowFit:
             inverse, right = _normal_equations(first, second, slope, self._offsets)
             found = np.einsum("nij,nj->ni", inverse, right)
             gain = np.where(np.abs(found[:, 1:2]) > 0.1, found[:, 1:2], np.inf)
-            planes += found[:, 2:] / gain / _scales(slope, self._offsets)
+            planes += found[:, 2:] / gain / _scales(slope)
         second, slope, moved = self._second(views, planes, smooth=True)
         inverse, right = _normal_equations(first, second, slope, self._offsets)
         return self._judged(planes, first, second, inverse, right, slope, moved)
@@ -134,7 +134,7 @@ class WindowFit:
         freedom = first.shape[1] - _UNKNOWNS
         gain = np.maximum(np.abs(found[:, 1]), 0.1)
         variance = left / freedom * inverse[:, 2, 2]
-        scale = _scales(slope, self._offsets)[:, 0]
+        scale = _scales(slope)[:, 0]
         return Fitted(
             planes,
             np.sqrt(np.maximum(variance, 0.0)) / gain / scale,
@@ -144,7 +144,7 @@ class WindowFit:
         )
 
 
-def _scales(slope: Grey, offsets: Array) -> Array:
+def _scales(slope: Grey) -> Array:
     """Return what columns of d, d_u, d_v are divided by, so that all are near 1."""
     size = np.sqrt(np.mean(np.square(slope, dtype=np.float64), axis=1))
     size = np.maximum(size, 1e-12)[:, None]
@@ -159,7 +159,7 @@ def _normal_equations(
     regressors = np.empty((n, m, _UNKNOWNS), dtype=np.float32)
     regressors[:, :, 0] = 1.0
     regressors[:, :, 1] = second
-    scale = _scales(slope, offsets)
+    scale = _scales(slope)
     for k, factor in enumerate((np.ones(m), *offsets.T)):
         regressors[:, :, 2 + k] = slope * factor / scale[:, k : k + 1]
     turned = regressors.transpose(0, 2, 1)
