@@ -159,6 +159,6 @@ def write_sample(
         OSError: If the file can't be written.
     """
     mesh = sample_head(shape, n_faces=n_faces, open_neck=True)
-    text = head_as_obj(mesh, "open at the neck")
+    text = head_as_obj(mesh)
     write_atomically(Path(path), lambda file: file.write(text.encode("ascii")))
     return mesh

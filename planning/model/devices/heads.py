@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from geometry.arrays import Array, Mask
+from geometry.arrays import Array
 
 from .bodies import Body, Triple
 
@@ -90,12 +90,6 @@ class MeasuringVolume:
         """Return n planes of n x n points, nearest to farthest, (n n n, 3) [m]."""
         depths = np.linspace(self.near_m, self.far_m, n)
         return np.concatenate([self.plane(float(depth), n) for depth in depths])
-
-    def contains(self, points: Array) -> Mask:
-        """Return whether points (..., 3) of the head's frame lie in it."""
-        depth = points[..., 2]
-        inside = np.abs(points[..., :2]) <= 0.5 * self.size_at(depth)
-        return (depth >= self.near_m) & (depth <= self.far_m) & inside.all(axis=-1)
 
 
 @dataclass(frozen=True)
