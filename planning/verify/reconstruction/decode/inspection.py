@@ -63,10 +63,18 @@ def inspect(
         window = in_light(window, tone_curve(window, good))
     broken = broken_pixels(window, good, names)
     _require_codes(window, good & ~broken, patterns)
+    frames, notes = trusted(window, lit, clipped, broken, curved)
+    return Frames(frames, corner), notes
+
+
+def trusted(
+    window: Images, lit: Mask, clipped: Mask, broken: Mask, curved: float
+) -> tuple[Images, tuple[str, ...]]:
+    """Return images without what can't be trusted, and a clause for each reason."""
     reasons = (
         (share_of_lit(clipped, lit), "are clipped and left out"),
         (
-            share_of_lit(broken, good),
+            share_of_lit(broken, lit & ~clipped),
             "are left out: frames and inverses there don't add up to white and black",
         ),
     )
@@ -85,7 +93,7 @@ def inspect(
     # Without contrast nothing is decoded; what is clipped stays so for all to see.
     frames[:, broken] = 0
     frames[:, clipped] = 255
-    return Frames(frames, corner), notes
+    return frames, notes
 
 
 def lit_pixels(stack: Images) -> Mask:

@@ -22,14 +22,12 @@ from planning.verify.reconstruction.decode.inspection import (
     lit_part,
     lit_pixels,
     require_different,
-    share_of_lit,
+    trusted,
 )
 from planning.verify.reconstruction.decode.tone_curve import in_light, tone_curve
 from planning.verify.reconstruction.patterns.dense_patterns import DensePattern
 from planning.verify.reconstruction.patterns.ring_patterns import Frames
 
-# Pixels left out are worth a word from this share on.
-_WORTH_A_WORD = 0.01
 # Bits that stand out by this share of the contrast are looked at.
 _SURE = 0.3
 # A frame is its bit if it changes between stripes that follow each other in this share
@@ -78,27 +76,7 @@ def inspect_dense(
     broken_pixels(window[:n_paired], few, named[:n_paired])
     broken = good & _broken(window[:n_paired], few)
     require_order(window[:n_paired], good & ~broken, pattern, named)
-    notes = tuple(
-        f"{share:.1%} of the lit pixels {why}"
-        for share, why in (
-            (share_of_lit(clipped, lit), "are clipped and left out"),
-            (
-                share_of_lit(broken, good),
-                "are left out: frames and inverses there don't add up to white and "
-                "black",
-            ),
-        )
-        if share > _WORTH_A_WORD
-    )
-    if is_bent(curved):
-        notes += (
-            f"grey levels weren't in proportion to light (half-bright frames and "
-            f"inverses added up to {1.0 + curved:.0%} of white); one curve for all "
-            f"frames made that good",
-        )
-    frames = window.copy()
-    frames[:, broken] = 0
-    frames[:, clipped] = 255
+    frames, notes = trusted(window, lit, clipped, broken, curved)
     return Frames(frames[np.argsort(order)], corner), notes
 
 
