@@ -6,12 +6,12 @@ one honest claim of two hundred lay beyond three of its standard errors, not one
 hundred. The larger draw knows the spread, and grants less room.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
-from geometry.arrays import Array
+from geometry.arrays import Array, Ints, Mask
 from planning.model.document.coverage_records import PredictedSigma
 from planning.verify.audit.audit_case import AuditCase
 from planning.verify.audit.audit_findings import AuditFindings
@@ -159,22 +159,35 @@ def _n_claimed(case: AuditCase) -> int:
     return max(round(case.estimator.n_earned * share), 1)
 
 
+def least_terms(
+    wanted: Mask, of_all: str, pairs: Iterable[tuple[Ints, dict[str, Array]]]
+) -> dict[str, Array]:
+    """Return the terms of the best pair of each wanted sample [m], (n,) each.
+
+    `pairs` have samples and their terms; the term `of_all` is there without any pair.
+    """
+    least = np.full(len(wanted), np.inf)
+    best = {of_all: np.zeros(len(wanted))}
+    for some, terms in pairs:
+        total = deviation(terms)
+        better = total < least[some]
+        rows = some[better]
+        least[rows] = total[better]
+        for name, values in terms.items():
+            best.setdefault(name, np.zeros(len(wanted)))[rows] = values[better]
+    return {name: values[wanted] for name, values in best.items()}
+
+
 def _best_pairs(case: AuditCase) -> dict[str, Array]:
     """Terms of the best pair of each measured sample of the target [m], (n,) each."""
-    actual = case.actual
+    actual, limits = case.actual, case.plan.requirements.triangulation
     wanted = actual.samples.in_target & actual.measured
-    least = np.full(len(wanted), np.inf)
-    limits = case.plan.requirements.triangulation
-    best: dict[str, Array] = {"edges": np.zeros(len(wanted))}
-    for p, projector in enumerate(audit_projectors(case.plan)):
-        for c, camera in enumerate(audit_cameras(case.plan)):
-            some = np.flatnonzero(wanted & (actual.pairs[p, c] == MEASURED))
-            pair = PairGeometry.of(projector, camera, actual.samples.take(some))
-            terms = error_terms(pair, limits)
-            total = deviation(terms)
-            better = total < least[some]
-            rows = some[better]
-            least[rows] = total[better]
-            for name, values in terms.items():
-                best.setdefault(name, np.zeros(len(wanted)))[rows] = values[better]
-    return {name: values[wanted] for name, values in best.items()}
+
+    def pairs() -> Iterator[tuple[Ints, dict[str, Array]]]:
+        for p, projector in enumerate(audit_projectors(case.plan)):
+            for c, camera in enumerate(audit_cameras(case.plan)):
+                some = np.flatnonzero(wanted & (actual.pairs[p, c] == MEASURED))
+                pair = PairGeometry.of(projector, camera, actual.samples.take(some))
+                yield some, error_terms(pair, limits)
+
+    return least_terms(wanted, "edges", pairs())
