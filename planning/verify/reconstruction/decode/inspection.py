@@ -63,11 +63,11 @@ def inspect(
         window = in_light(window, tone_curve(window, good))
     broken = broken_pixels(window, good, names)
     _require_codes(window, good & ~broken, patterns)
-    frames, notes = trusted(window, lit, clipped, broken, curved)
+    frames, notes = usable_frames(window, lit, clipped, broken, curved)
     return Frames(frames, corner), notes
 
 
-def trusted(
+def usable_frames(
     window: Images, lit: Mask, clipped: Mask, broken: Mask, curved: float
 ) -> tuple[Images, tuple[str, ...]]:
     """Return images without what can't be trusted, and a clause for each reason."""

@@ -22,7 +22,7 @@ from planning.verify.reconstruction.decode.inspection import (
     lit_part,
     lit_pixels,
     require_different,
-    trusted,
+    usable_frames,
 )
 from planning.verify.reconstruction.decode.tone_curve import in_light, tone_curve
 from planning.verify.reconstruction.patterns.dense_patterns import DensePattern
@@ -76,7 +76,7 @@ def inspect_dense(
     broken_pixels(window[:n_paired], few, named[:n_paired])
     broken = good & _broken(window[:n_paired], few)
     require_order(window[:n_paired], good & ~broken, pattern, named)
-    frames, notes = trusted(window, lit, clipped, broken, curved)
+    frames, notes = usable_frames(window, lit, clipped, broken, curved)
     return Frames(frames[np.argsort(order)], corner), notes
 
 
