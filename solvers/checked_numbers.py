@@ -43,6 +43,16 @@ def whole_number(name: str, numbers: object, *, least: int) -> int:
     return value
 
 
+def allowed_sets(
+    name: str, numbers: object, *, least: int, fixed: NDArray[np.int64]
+) -> int:
+    """Return how many sets are allowed, or raise ValueError if more are fixed."""
+    allowed = whole_number(name, numbers, least=least)
+    if not allowed >= fixed.size:
+        raise ValueError(f"{name} is {allowed}, but {fixed.size} sets are fixed")
+    return allowed
+
+
 def set_names(name: str, numbers: ArrayLike, n: int) -> NDArray[np.int64]:
     """Return the sets that are named, increasing, each once.
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from solvers.checked_numbers import set_names, whole_number
+from solvers.checked_numbers import allowed_sets, set_names, whole_number
 from solvers.covers.bounds.reduced_cover import ReducedCover
 from solvers.covers.bounds.reductions import forgiven, reduce_problem
 from solvers.covers.search.neighbourhood import greedy, prune
@@ -151,9 +151,7 @@ def solve_cover(
     """
     fixed = problem.fixed
     if max_sets is not None:
-        max_sets = whole_number("max_sets", max_sets, least=1)
-        if not max_sets >= fixed.size:
-            raise ValueError(f"max_sets is {max_sets}, but {fixed.size} sets are fixed")
+        max_sets = allowed_sets("max_sets", max_sets, least=1, fixed=fixed)
     seed = whole_number("seed", seed, least=0)
     work = WorkBudget(budget, time_limit=time_limit)
     cover = _or_reduce(problem, reduced)
@@ -218,9 +216,7 @@ def solve_max_coverage(
         reduced: This problem's `reduced_problem`, where it is at hand.
     """
     fixed = problem.fixed
-    n_sets = whole_number("n_sets", n_sets, least=0)
-    if not n_sets >= fixed.size:
-        raise ValueError(f"n_sets is {n_sets}, but {fixed.size} sets are fixed")
+    n_sets = allowed_sets("n_sets", n_sets, least=0, fixed=fixed)
     warm_start = () if warm_start is None else warm_start
     start = set_names("warm_start", warm_start, problem.costs.size)
     if start.size > n_sets:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from solvers.checked_numbers import set_names, whole_number
+from solvers.checked_numbers import allowed_sets, set_names, whole_number
 from solvers.covers.answers import cut_short
 from solvers.one_thread import on_one_thread
 from solvers.status import SolveStatus, WorkBudget
@@ -113,9 +113,7 @@ def solve_pair_cover(
     """
     fixed = problem.fixed
     if max_sets is not None:
-        max_sets = whole_number("max_sets", max_sets, least=1)
-        if not max_sets >= fixed.size:
-            raise ValueError(f"max_sets is {max_sets}, but {fixed.size} sets are fixed")
+        max_sets = allowed_sets("max_sets", max_sets, least=1, fixed=fixed)
     seed = whole_number("seed", seed, least=0)
     work = WorkBudget(budget, time_limit=time_limit)
     cover = pair_rows(problem)
@@ -233,9 +231,7 @@ def solve_most_pairs(
         budget: Counted work, in entries touched.
     """
     fixed = problem.fixed
-    n_sets = whole_number("n_sets", n_sets, least=0)
-    if not n_sets >= fixed.size:
-        raise ValueError(f"n_sets is {n_sets}, but {fixed.size} sets are fixed")
+    n_sets = allowed_sets("n_sets", n_sets, least=0, fixed=fixed)
     start = set_names(
         "warm_start", () if warm_start is None else warm_start, problem.n_sets
     )
