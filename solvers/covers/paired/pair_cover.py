@@ -118,13 +118,9 @@ def solve_pair_cover(
     work = WorkBudget(budget, time_limit=time_limit)
     cover = pair_rows(problem)
     work.spend(cover.size * (1.0 + cover.n_sets / 64.0))
-    if not cover.quota > 0:
+    if not cover.quota > 0 or cover.meets(fixed):
+        # Without any, nothing is met but a requirement of nothing.
         proof = "the fixed sets suffice" if fixed.size else _NOTHING
-        return PairCoverSolution(
-            problem, SolveStatus.OPTIMAL, fixed, float(fixed.size), proof
-        )
-    if cover.meets(fixed):
-        proof = "the fixed sets suffice"
         return PairCoverSolution(
             problem, SolveStatus.OPTIMAL, fixed, float(fixed.size), proof
         )
