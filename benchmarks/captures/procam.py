@@ -18,9 +18,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.captures.local_homography import codes_at
 from planning.verify.reconstruction.calibration import PairCalibration
 from planning.verify.reconstruction.captures.gray.gray_captures import read_capture
-from planning.verify.reconstruction.captures.gray.local_homography import codes_at
 from planning.verify.reconstruction.captures.gray.pair_file import read_pair
 from planning.verify.reconstruction.captures.images import read_grey
 from planning.verify.reconstruction.decode.dense.two_rays import meet_rays
