@@ -10,7 +10,8 @@ light a plane has 1/z linear in R, so a chord is straight in 1/z::
 
     e = sqrt(1 + R^2) z^2 |d^2(1/z)/dR^2| h^2 / 8
 
-`formulation.md`, section 4. A crease has a slope jump and no kappa: `ring_creases`.
+`docs/method/rings.md`, "Spacing". A crease has a slope jump and no kappa, see
+`ring_creases`.
 """
 
 import numpy as np

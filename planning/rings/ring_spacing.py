@@ -1,7 +1,7 @@
 """Ring radii at equal steps of a density: fine where the surface bends, limited.
 
-`formulation.md`, section 4: radii at equal steps of the integral of sqrt(kappa) dR
-bound the largest interpolation error. Here the density of rings is::
+`docs/method/rings.md`, "Spacing": radii at equal steps of the integral of sqrt(kappa)
+dR bound the largest interpolation error. Here the density of rings is::
 
     d(c) = clip(s sqrt(kappa(c)), 1/h_max(c), 1/h_min(c))
 

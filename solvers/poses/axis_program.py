@@ -7,7 +7,7 @@ axis is two numbers a. With u = X/|X| and z(a) the unit vector a along the axis:
     diverging:  z(a) = (2 a_x, 2 a_y, 1 - a.a)/(1 + a.a),       d = (u.z) u - z
 
 so m = d/|d| is the ring normal at X and |a| = tan(half the tilt) in diverging light.
-For a camera with viewing ray r and g = G m (`formulation.md`, section 3, G = J_r^T
+For a camera with viewing ray r and g = G m (`docs/reference/semantics.md`, G = J_r^T
 (N r^T - (N.r) I)) the three limits on a measurable pair, each as a share of its limit,
 make a smooth count of what is measured::
 

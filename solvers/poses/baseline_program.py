@@ -30,7 +30,7 @@ limit at the start may stay there but gets no worse.
 The program is smooth and not convex; IPOPT gives a local optimum from exact
 derivatives. What coverage really does is for the caller's rays to say.
 
-Source: Lee and Krim, 2014, eqs. (9)-(10); `formulation.md` section 6.
+Source: Lee and Krim, 2014, eqs. (9)-(10); `docs/method/baselines.md`.
 """
 
 from dataclasses import dataclass

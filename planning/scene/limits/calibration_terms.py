@@ -8,7 +8,7 @@ equal code by dY. With v = r x (N x m) the point so moves along the normal by::
 A turn by d moves by d x (P - O), pixels off by p by t J_r p: the principal point all by
 the same, the focal length, as a share e, by e times what they are off the principal
 point. With g = J_r^T v and v.(P - O) = 0 these are t |v|, t |g| and t g.(u - u_0). For
-surfaces of equal code `patterns.surface_levers` has the same three.
+surfaces of equal code `codes.surfaces` has the same three.
 """
 
 import numpy as np

@@ -10,7 +10,7 @@ pixels times k, what a pixel of the panel is along m::
 with the period P of N shifted sinusoids, the noise s_I of a pixel half lit and the
 amplitude B; without shifts a code is told to a pixel, 1 / sqrt(12) of it. A blur b of
 light and image, in pixels of the panel, leaves exp(-2 pi^2 (b / P)^2) of an amplitude.
-`formulation.md`, section 3; `docs/method/dense.md`.
+`docs/method/dense.md`.
 """
 
 from dataclasses import dataclass, field

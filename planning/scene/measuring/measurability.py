@@ -13,7 +13,7 @@ with s_px = s_0 / (-N.L), and the noise of the light beside it where the rig sta
 (`edge_terms`). Of coded pixels m follows from r (`codes.surfaces`), and beside s_R
 stands the noise of the phase (`code_noise`). s_v and s_m are what errors of the
 calibration move the viewing ray by along v, and the surface of equal code along m
-(`calibration_terms`). `formulation.md`, sections 3 and 8.
+(`calibration_terms`). `docs/reference/semantics.md`, "Measurable".
 """
 
 from collections.abc import Sequence

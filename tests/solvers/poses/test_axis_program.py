@@ -86,7 +86,7 @@ def ring_normals(program, axis):
 
 @pytest.mark.parametrize("light", LIGHTS)
 def test_scores_are_the_three_limits_of_a_measurable_pair(light):
-    """`formulation.md` section 3, m and h by differences; rings too fine to damp."""
+    """As in semantics.md, m and h by differences; rings too fine to damp."""
     program = program_for(light, gap=1e-4, min_pitch_px=0.15)
     axis = np.array([0.11, 0.09])
     m, steepness = ring_normals(program, axis)

@@ -93,7 +93,7 @@ def _at_floors(requirements: Requirements) -> Requirements:
 
     Planning limits are stricter, for accuracy: incidence 85 degrees instead, no tangent
     limit, a pitch of 3 px, no limit on s_N or the sampling distance. |r.m| stays, since
-    the decoder keeps it (formulation.md, section 7).
+    the decoder keeps it.
     """
     return replace(
         requirements,

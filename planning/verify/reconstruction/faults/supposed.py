@@ -27,7 +27,7 @@ Role = Literal["cameras", "projectors", "objects"]
 Places = tuple[Array, Array]
 # Edges of each pair of devices that are looked at, and of all pairs.
 _EDGES_A_PAIR, _EDGES = 400, 20_000
-# Incidence of light beyond which edges smear: formulation.md section 2 [rad].
+# Incidence of light beyond which edges smear, `docs/use/faults.md` [rad].
 GRAZING = np.deg2rad(70.0)
 # Pairs with fewer edges say nothing.
 _LEAST_EDGES = 60
