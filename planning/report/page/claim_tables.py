@@ -8,11 +8,11 @@ from planning.model.document.certificates import Certificate
 from planning.model.document.coverage_records import ProjectorMarginal
 from planning.model.plan import RigPlan
 from planning.model.words import area_words, percent
+from planning.report.summary.cause_words import CAUSE_WORDS
 from planning.report.summary.coverage_lines import area_rows, reach_asked, share_cell
 from planning.report.summary.devices.station_lines import STATIONS
 from planning.report.summary.region_lines import region_place
 
-from .layers import CAUSE_WORDS
 from .markup import table
 
 _COSTS = {

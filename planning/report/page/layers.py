@@ -10,26 +10,14 @@ from numpy.typing import NDArray
 from geometry.arrays import Array
 from geometry.curvature.curvature import principal_curvatures
 from planning.model.plan import RigPlan
-from planning.scene.limits.pair_limits import MEASURED_LIMITS
-from planning.scene.limits.projector_limits import PROJECTOR_LIMITS
-from planning.scene.limits.view_pair_limits import VIEW_PAIR_LIMITS
+from planning.report.summary.cause_words import CAUSE_WORDS
 from planning.verify.audit.audit_samples import AuditSamples
-from planning.verify.audit.predicates.predicates import (
-    LIGHT_CAUSES,
-    PAIR_CAUSES,
-    SIGHT_CAUSES,
-)
-from planning.verify.audit.predicates.view_pairs import VIEW_CAUSES
+from planning.verify.audit.predicates.view_pairs import CAUSES
 from planning.verify.reconstruction.check.cloud_file import BLUE_TO_RED, VIRIDIS
 
 from .payload import quantised
 from .per_face import PerFace
 
-CAUSES = LIGHT_CAUSES + SIGHT_CAUSES + PAIR_CAUSES + VIEW_CAUSES
-CAUSE_WORDS = {
-    limit.name: limit.words
-    for limit in (*PROJECTOR_LIMITS, *MEASURED_LIMITS, *VIEW_PAIR_LIMITS)
-}
 # Colours of categories, told apart by lightness as well as by hue: M. Okabe, K. Ito,
 # "Color universal design", 2008, and greys.
 _APART = (

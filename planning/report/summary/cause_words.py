@@ -13,7 +13,7 @@ from planning.scene.limits.view_pair_limits import VIEW_PAIR_LIMITS
 _LEAST_SHARE = 0.01
 # Of the unreachable area, what lies inside to be told how to leave it out.
 _MOST = 0.5
-_CAUSE_WORDS = {
+CAUSE_WORDS = {
     limit.name: limit.words
     for limit in (*PROJECTOR_LIMITS, *MEASURED_LIMITS, *VIEW_PAIR_LIMITS)
 }
@@ -23,7 +23,7 @@ def causes_line(areas: dict[str, float], whole: float, *, most: int = 3) -> str:
     """Return the largest causes with their share of an area, as one line."""
     ranked = sorted(areas.items(), key=lambda pair: -pair[1])[:most]
     return "; ".join(
-        f"{percent(area / whole)} {_CAUSE_WORDS.get(cause, cause)}"
+        f"{percent(area / whole)} {CAUSE_WORDS.get(cause, cause)}"
         for cause, area in ranked
     )
 
@@ -33,7 +33,7 @@ def areas_line(areas: dict[str, float]) -> str:
     ranked = sorted(areas.items(), key=lambda pair: -pair[1])
     phrases = [pair for pair in ranked if pair[1] >= _LEAST_SHARE * sum(areas.values())]
     return "; ".join(
-        f"{area_words(area)} {_CAUSE_WORDS.get(c, c)}" for c, area in phrases
+        f"{area_words(area)} {CAUSE_WORDS.get(c, c)}" for c, area in phrases
     )
 
 

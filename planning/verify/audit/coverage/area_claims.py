@@ -28,10 +28,9 @@ from planning.verify.audit.predicates.predicates import (
     light_steps,
 )
 from planning.verify.audit.predicates.reference_devices import reference_projectors
-from planning.verify.audit.predicates.view_pairs import VIEW_CAUSES
+from planning.verify.audit.predicates.view_pairs import CAUSES
 
 _Device = PlannedProjector | PlannedCamera | AuditProjector
-_CAUSES = LIGHT_CAUSES + SIGHT_CAUSES + PAIR_CAUSES + VIEW_CAUSES
 
 
 def recomputed_areas(case: AuditCase) -> dict[str, dict[str, float]]:
@@ -95,7 +94,7 @@ def _audit_causes(case: AuditCase, findings: AuditFindings) -> None:
     dark_m2 = areas.area_m2 - areas.reachable_by_projectors_m2
     beyond_m2 = areas.lit_m2 - areas.reachable_by_cameras_m2
     for name, flags, furthest, causes, total in (
-        ("uncovered", unseen, actual.cause, _CAUSES, unseen_m2),
+        ("uncovered", unseen, actual.cause, CAUSES, unseen_m2),
         ("unreachable", dark, reachable.furthest, LIGHT_CAUSES, dark_m2),
         ("unmeasurable", beyond, reachable.furthest_pair, sight, beyond_m2),
     ):

@@ -18,19 +18,13 @@ from planning.verify.audit.audit_findings import AuditFindings
 from planning.verify.audit.audit_samples import AuditSamples, draw_region
 from planning.verify.audit.estimates import POINT, ROUNDING, pooled_error
 from planning.verify.audit.predicates.examined import what_any_could, what_devices_do
-from planning.verify.audit.predicates.predicates import (
-    LIGHT_CAUSES,
-    PAIR_CAUSES,
-    SIGHT_CAUSES,
-)
 from planning.verify.audit.predicates.recompute import Reachable, Recomputed
-from planning.verify.audit.predicates.view_pairs import VIEW_CAUSES
+from planning.verify.audit.predicates.view_pairs import CAUSES
 
 # Samples of the audit in a large region, and of the plan, which earns no more tolerance
 # for stating fewer.
 _AT_LEAST, _CLAIMED = 500, 400
 _SLACK = 1e-9
-_CAUSES = LIGHT_CAUSES + SIGHT_CAUSES + PAIR_CAUSES + VIEW_CAUSES
 
 
 # What becomes of samples, what could, and which region they lie in.
@@ -125,7 +119,7 @@ def _audit_coverage(
             f"claimed {low:.6g} m², must lie between 0 and {larger} = {high:.6g} m²",
         )
     causes = areas.uncovered_by_cause
-    unknown = ", ".join(sorted(set(causes) - set(_CAUSES)))
+    unknown = ", ".join(sorted(set(causes) - set(CAUSES)))
     key = "uncovered_by_cause"
     findings.holds(not unknown, key, f"causes that there are not: {unknown}")
     findings.number(f"{key} (sum)", sum(causes.values()), unmeasured, 1e-4 * whole)
@@ -153,8 +147,8 @@ def _audit_coverage(
 
 def _by_cause(cause: Ints) -> Iterator[tuple[str, Mask]]:
     """Yield each cause and where it is the one; an obstacle's stands in two places."""
-    for name in dict.fromkeys(_CAUSES):
-        yield name, np.isin(cause, [k for k, c in enumerate(_CAUSES) if c == name])
+    for name in dict.fromkeys(CAUSES):
+        yield name, np.isin(cause, [k for k, c in enumerate(CAUSES) if c == name])
 
 
 def region_parts(case: AuditCase) -> _Parts:

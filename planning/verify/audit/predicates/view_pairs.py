@@ -23,10 +23,13 @@ from planning.verify.audit.audit_samples import AuditSamples
 
 from .audit_devices import AuditCamera
 from .audit_optics import dot, in_frame, in_world, pixels_of, towards
+from .predicates import LIGHT_CAUSES, PAIR_CAUSES, SIGHT_CAUSES
 
 # Of the distance: central differences of this step are exact to a billionth.
 _STEP = 1e-5
 VIEW_CAUSES = ("few_views", "view_angle", "view_sigma")
+# What holds samples back, by one number each.
+CAUSES = LIGHT_CAUSES + SIGHT_CAUSES + PAIR_CAUSES + VIEW_CAUSES
 # Limits of pairs: all but the number of views.
 GOOD = len(VIEW_CAUSES) - 1
 
