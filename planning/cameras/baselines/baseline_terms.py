@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from geometry.arrays import lengths
 from geometry.devices import PinholeModel
+from planning.model.devices.device_poses import poses_of
 from planning.model.devices.planned import PlannedCamera
 from planning.model.requirements import Workspace
 from planning.scene.workspace.admissible import half_spaces
@@ -25,7 +26,7 @@ from solvers.poses.baseline_problem import (
 
 from .baseline_limits import BaselineLimits, RingsOnSurface, best_rings
 from .baseline_rows import check_seam
-from .camera_moves import Looks, poses_of
+from .camera_moves import Looks
 from .seams import SampledSurface, Seam, both_orders, find_seams, spread_points
 
 _Array = NDArray[np.float64]

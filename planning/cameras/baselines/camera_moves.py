@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.poses import look_at
-from planning.model.devices.device_poses import moved_to
+from planning.model.devices.device_poses import moved_to, poses_of
 from planning.model.devices.planned import PlannedCamera
 from planning.model.requirements import Workspace
 from planning.scene.workspace.admissible import admissible
@@ -26,11 +26,6 @@ class Looks:
     aims: _Array
     ups: _Array
     rolls: _Array
-
-
-def poses_of(cameras: Sequence[PlannedCamera]) -> _Array:
-    """Return the poses of cameras, shape (k, 4, 4)."""
-    return np.stack([camera.world_from_device for camera in cameras])
 
 
 def at_poses(cameras: Sequence[PlannedCamera], poses: _Array) -> list[PlannedCamera]:

@@ -11,12 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from planning.model.devices.device_poses import poses_of
 from planning.model.devices.planned import PlannedCamera
 from solvers.poses.baseline_problem import smallest_baseline
 
 from .baseline_limits import BaselineLimits, RingsOnSurface
 from .baseline_terms import BaselineTerms
-from .camera_moves import at_poses, between, centres_between, looks_of, poses_of
+from .camera_moves import at_poses, between, centres_between, looks_of
 from .seams import SampledSurface, neighbouring_pairs, overlap_components
 
 _Array = NDArray[np.float64]

@@ -1,5 +1,6 @@
 """Poses of devices as written, and projectors moved with their ring frames."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypeVar
 
@@ -14,6 +15,11 @@ _D = TypeVar("_D", PlannedProjector, PlannedCamera)
 
 _POSITION_DECIMALS = 5
 DECIMALS = 12
+
+
+def poses_of(devices: Sequence[PlannedProjector | PlannedCamera]) -> Array:
+    """Return the poses of devices, shape (k, 4, 4)."""
+    return np.stack([device.world_from_device for device in devices])
 
 
 def rounded_pose(pose: Array) -> Array:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from geometry.arrays import lengths
 from geometry.devices import DeviceModel, turned_to
 from geometry.poses import fibonacci_cap, look_at
-from planning.model.devices.device_poses import moved_to
+from planning.model.devices.device_poses import moved_to, poses_of
 from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.errors import InfeasibleLimitsError
 from planning.model.requirements import Workspace
@@ -139,7 +139,7 @@ class Candidates(Generic[_D]):
         """
         if not chosen:
             return ()
-        poses = np.stack([device.world_from_device for device in chosen])
+        poses = poses_of(chosen)
         if self.site is not None:
             reach = scale * self._spacing(n_lattice // (1 + _BESIDE))
             return self._at(poses_beside(self.site, poses, _AROUND, reach=reach))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from geometry.files.file_content import file_content
-from planning.model.devices.device_poses import moved_to
+from planning.model.devices.device_poses import moved_to, poses_of
 from planning.model.devices.planned import PlannedCamera, PlannedProjector
 from planning.model.errors import InputError, PlanFileError
 from planning.model.files import reading
@@ -21,7 +21,7 @@ from planning.model.packed_arrays import unpacked_arrays
 from planning.projectors.candidate_set import CandidateSet
 from planning.report.partial_plan import Prepared
 from planning.scene.draws import DRAWS
-from planning.scene.placed_bodies import Device, existing_devices, movable
+from planning.scene.placed_bodies import existing_devices, movable
 
 from .front_matrix import FrontMatrix
 
@@ -72,10 +72,10 @@ class KeptFront:
             {
                 "stages": matrix.candidates.stages,
                 "seen": np.packbits(matrix.seen, axis=0),
-                "projector_poses": _poses(projectors),
+                "projector_poses": poses_of(projectors),
                 "projector_rings": np.stack([p.world_from_ring for p in projectors]),
                 "projector_models": _models(projectors, ready.templates),
-                "camera_poses": _poses(cameras),
+                "camera_poses": poses_of(cameras),
                 "camera_models": _models(cameras, ready.cameras),
                 "point_rings": np.stack([p.world_from_ring for p in taken]),
             },
@@ -280,10 +280,6 @@ def _digest(*parts: object) -> str:
         else:
             sha.update(json.dumps(part, sort_keys=True).encode())
     return sha.hexdigest()
-
-
-def _poses(devices: Sequence[Device]) -> NDArray[np.float64]:
-    return np.stack([device.world_from_device for device in devices])
 
 
 def _models(
