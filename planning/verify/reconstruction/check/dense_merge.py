@@ -59,7 +59,7 @@ def merge_dense(cloud: Cloud, plan: Scanner, *, cell_m: float) -> DenseMerged:
     sigma = cloud.sigma(facing)
     # Unsure points scatter over cells beside those of sure ones, and would stay there;
     # along normals of such points, which scatter too, some would seem sure.
-    about = _cells(cloud.points, np.zeros(len(cloud), np.int64), _PLACE * cell_m)
+    about = cells_of(cloud.points, np.zeros(len(cloud), np.int64), _PLACE * cell_m)
     spread = np.linalg.norm(cloud.shift, axis=1) * np.hypot(
         cloud.noise_px, cloud.bias_px
     )
@@ -96,7 +96,7 @@ def _merged(
     cloud: Cloud, facing: Array, sigma: Array, plan: Scanner, cell_m: float
 ) -> _Merged:
     octant = ((facing > 0.0) @ np.array([1, 2, 4])).astype(np.int64)
-    _, cell = np.unique(_cells(cloud.points, octant, cell_m), return_inverse=True)
+    _, cell = np.unique(cells_of(cloud.points, octant, cell_m), return_inverse=True)
     best = _surest(cell, sigma)
     own = best[cell]
     # Along the surest one's normal: aside of it points lie on the same surface.
@@ -158,7 +158,7 @@ def _relief(cell_m: float) -> float:
     return 0.25 * cell_m
 
 
-def _cells(points: Array, kind: Indices, side_m: float) -> Array:
+def cells_of(points: Array, kind: Indices, side_m: float) -> Array:
     """Return a number of each point's cube in space and kind, (n,)."""
     x, y, z = np.floor((points - points.min(axis=0)) / side_m).T
     cube = (x * (y.max() + 1.0) + y) * (z.max() + 1.0) + z

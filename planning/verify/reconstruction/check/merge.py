@@ -18,7 +18,7 @@ from planning.verify.reconstruction.decode.lit_image import LitImage
 from planning.verify.reconstruction.scanner import Scanner
 
 from .calibration_sigma import calibration_sigma, camera_px
-from .dense_merge import merge_dense
+from .dense_merge import cells_of, merge_dense
 from .overlaps import compare_overlaps, pixel_sizes
 from .rings.point_sigma import Sigmas
 from .rings.ring_curves import RingCurves
@@ -162,7 +162,7 @@ def merge_rings(
         some = np.flatnonzero(among & stays)
         if len(some):
             side_m = side_px * float(np.median(size[some]))
-            cell = _cells(fitted.points[some], kind[some], side_m)
+            cell = cells_of(fitted.points[some], kind[some], side_m)
             most = plan.limits.max_sigma_m
             stays[some] = _sure(cell, source[some], total[some], ratio, most)
     return Merged(
@@ -186,13 +186,6 @@ def _sharpness(cloud: Cloud) -> Array:
                 usual = np.nanmedian(cloud.blur_px[pair])
                 sharpness[pair] = cloud.blur_px[pair] / usual
     return sharpness
-
-
-def _cells(points: Array, kind: Indices, side_m: float) -> Array:
-    """Return a number of each point's cube in space and kind, (n,)."""
-    x, y, z = np.floor((points - points.min(axis=0)) / side_m).T
-    cube = (x * (y.max() + 1.0) + y) * (z.max() + 1.0) + z
-    return cube * (kind.max() + 1.0) + kind
 
 
 def _sure(
