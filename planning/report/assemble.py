@@ -178,6 +178,11 @@ class Draft:
         return RigPlan(document, surface, proof=proof)
 
 
+def as_truncated(plan: RigPlan) -> RigPlan:
+    """Return a plan that says that its search was cut."""
+    return replace(plan, document=plan.document.changed(truncated=True))
+
+
 def _rounded_devices(partial: PartialPlan) -> Devices:
     """The devices and the reference sets as they will be written."""
     projectors, cameras = partial.final_projectors, partial.cameras

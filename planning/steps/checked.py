@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from planning.model.plan import InterruptedPlanError, RigPlan
 from planning.model.progress import TIME_IS_UP, Stopwatch
+from planning.report.assemble import as_truncated
 from planning.report.entries.cost_entry import cost_record
 from planning.report.partial_plan import PartialPlan
 from planning.report.summary.shortfall import shortfalls
@@ -76,7 +77,7 @@ def checked_plan(
     Raises:
         InterruptedPlanError: If the check is interrupted; it carries the plan as it is.
     """
-    cut = replace(plan, document=plan.document.changed(truncated=True))
+    cut = as_truncated(plan)
     clock.extend()
     try:
         if keep is not None:

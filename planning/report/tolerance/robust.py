@@ -26,7 +26,7 @@ from planning.model.plan import InterruptedPlanError, RigPlan
 from planning.model.progress import TIME_IS_UP, Stopwatch
 from planning.model.requirements import Requirements
 from planning.proofs.candidate_certificate import larger
-from planning.report.assemble import write_plan
+from planning.report.assemble import as_truncated, write_plan
 from planning.report.entries.request_entry import signed
 from planning.report.partial_plan import PartialPlan, PlanRequest
 from planning.rig.wishes import Wishes
@@ -96,7 +96,7 @@ def robustly(planned: Planned) -> Planned:
             return plan, partial
         if keep is not None:
             # What there is if the process ends while rigs are drawn.
-            keep(_cut(plan))
+            keep(as_truncated(plan))
         robust = _robust(request, plan.requirements)
         rms = Asked.of(plan.requirements).rms_m
         n = _RIGS if robust.mounting == AS_PLANNED else _MOUNTED_RIGS
@@ -129,7 +129,7 @@ def robustly(planned: Planned) -> Planned:
                     latest = planned(request, clock, keep)
                     if latest[0].document.truncated:
                         # The one before is whole, and better known.
-                        return _cut(rounds[-1].plan), rounds[-1].partial
+                        return as_truncated(rounds[-1].plan), rounds[-1].partial
                     # Of its own rigs nothing is known.
                     aim = replace(aim, drawn_m=None)
                     more = surer(latest[1], aim, clock)
@@ -140,10 +140,10 @@ def robustly(planned: Planned) -> Planned:
         except InfeasibleLimitsError as error:
             clock.say(f"  nothing tighter can be planned: {error}")
         except KeyboardInterrupt:
-            raise InterruptedPlanError(_cut(latest[0])) from None
+            raise InterruptedPlanError(as_truncated(latest[0])) from None
         except TIME_IS_UP:
             clock.extend()
-            return _cut(latest[0]), latest[1]
+            return as_truncated(latest[0]), latest[1]
         return _recorded(rounds, robust)
 
     return made
@@ -171,10 +171,6 @@ def _robust(request: PlanRequest, asked: Requirements) -> Robust:
         asked.region_coverage,
         asked.triangulation.max_sigma_m,
     )
-
-
-def _cut(plan: RigPlan) -> RigPlan:
-    return replace(plan, document=plan.document.changed(truncated=True))
 
 
 def _with(plan: RigPlan, robust: Robust) -> RigPlan:

@@ -20,7 +20,7 @@ from planning.model.errors import InputError
 from planning.model.plan import InterruptedPlanError, RigPlan
 from planning.model.progress import TIME_IS_UP, Stopwatch
 from planning.proofs.device_stock import within_stock
-from planning.report.assemble import write_plan
+from planning.report.assemble import as_truncated, write_plan
 from planning.report.partial_plan import PartialPlan, PlanRequest
 from planning.report.summary.shortfall import shortfalls
 from planning.scene.draws import DRAWS
@@ -101,21 +101,17 @@ def jointly(planned: Planned) -> Planned:
             return plan, partial
         if keep is not None:
             # What there is if the process ends while devices are moved.
-            keep(_cut(plan))
+            keep(as_truncated(plan))
         joint = _Joint(request, clock, plan, partial, _slack(plan, partial))
         try:
             return joint.run(), joint.partial
         except KeyboardInterrupt:
-            raise InterruptedPlanError(_cut(joint.plan)) from None
+            raise InterruptedPlanError(as_truncated(joint.plan)) from None
         except TIME_IS_UP:
             clock.extend()
-            return _cut(joint.plan), joint.partial
+            return as_truncated(joint.plan), joint.partial
 
     return made
-
-
-def _cut(plan: RigPlan) -> RigPlan:
-    return replace(plan, document=plan.document.changed(truncated=True))
 
 
 def _slack(plan: RigPlan, partial: PartialPlan) -> float | None:
