@@ -24,7 +24,7 @@ _AVERAGED_SHARE, _LEAST_EDGES = 0.5, 0.6
 # anyway: where triangles are that large, moving vertices costs more than it wins.
 _FITTED_EDGES = 1.0
 # Turns sharper than this between two faces are creases of the object, not facets.
-_SHARPEST_FACET = np.deg2rad(40.0)
+SHARPEST_FACET = np.deg2rad(40.0)
 _LEAST_TURN = 1e-6
 
 
@@ -121,7 +121,7 @@ def _facet_size(mesh: TriangleMesh) -> float:
     sine = lengths(cross(normals[:, 0], normals[:, 1]))
     turn = np.arctan2(sine, np.einsum("ij,ij->i", normals[:, 0], normals[:, 1]))
     # Below, it is the rounding of flat surface.
-    turn[(turn > _SHARPEST_FACET) | (turn < _LEAST_TURN)] = 0.0
+    turn[(turn > SHARPEST_FACET) | (turn < _LEAST_TURN)] = 0.0
     ends = mesh.vertices[edges.ends[edge]]
     length = turn @ lengths(ends[:, 1] - ends[:, 0])
     area = turn @ mesh.face_areas[pairs].sum(axis=1)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.arrays import lengths
+from geometry.curvature.curvature import SHARPEST_FACET
 from geometry.mesh.mesh import TriangleMesh
 from geometry.mesh.topology import face_pairs
 from planning.model.devices.planned import PlannedProjector
@@ -15,9 +16,6 @@ from planning.scene.limits.projector_limits import LIT
 from planning.scene.scene import Scene
 
 from .beam_profile import on_faces
-
-# As in geometry.curvature: sharper turns are creases of the object, not facets.
-_SHARPEST_FACET = np.deg2rad(40.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +34,7 @@ def find_creases(mesh: TriangleMesh, step: float) -> Creases:
     """Return points at most `step` [m] apart along edges that turn by over 40 deg."""
     pairs, edge = face_pairs(mesh.edges)
     one, other = mesh.face_normals[pairs[:, 0]], mesh.face_normals[pairs[:, 1]]
-    sharp = np.einsum("ij,ij->i", one, other) < np.cos(_SHARPEST_FACET)
+    sharp = np.einsum("ij,ij->i", one, other) < np.cos(SHARPEST_FACET)
     ends = mesh.vertices[mesh.edges.ends[edge[sharp]]]
     length = lengths(ends[:, 1] - ends[:, 0])
     n = np.maximum(1, np.ceil(length / step).astype(np.int64))
