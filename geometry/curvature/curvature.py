@@ -8,10 +8,10 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from geometry.arrays import Array, Ints, Mask, lengths
+from geometry.arrays import Array, Ints, Mask, cross, lengths
 from geometry.mesh.diffusion import diffused
 from geometry.mesh.mesh import TriangleMesh
-from geometry.mesh.tensors import cross, principal, tangent_planes, unpacked
+from geometry.mesh.tensors import principal, tangent_planes, unpacked
 from geometry.mesh.topology import MeshEdges, components, face_pairs, numbered
 
 from .quadric import RINGS, fit_quadrics

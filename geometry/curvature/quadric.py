@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import igl
 import numpy as np
 
-from geometry.arrays import Array, Ints, Mask, lengths
-from geometry.mesh.tensors import area_normals, cross, packed, summed, unit
+from geometry.arrays import Array, Ints, Mask, cross, lengths
+from geometry.mesh.tensors import area_normals, packed, summed, unit
 from geometry.mesh.topology import numbered
 
 # A quadric has six coefficients: one ring is too few. More rings would reach farther on

@@ -3,10 +3,9 @@
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
-from geometry.arrays import Array, Ints
+from geometry.arrays import Array, Ints, cross
 from geometry.parallel import mapped
 
-from .tensors import cross
 from .topology import MeshEdges
 
 # Share of the change that may be missing. A solve that has come this far moves nothing
