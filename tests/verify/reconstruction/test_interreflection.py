@@ -127,7 +127,7 @@ def test_nothing_bounces_on_a_convex_body():
     assert found.record().warning() == ""
 
 
-def test_four_times_as_many_directions_leave_half_the_doubt():
+def test_four_times_as_many_directions_leave_less_than_half_the_doubt():
     rig = scanner(groove(30.0))
     cloud = reconstruct(rig, seed=0).merged.cloud
     few, more = (
@@ -135,10 +135,27 @@ def test_four_times_as_many_directions_leave_half_the_doubt():
     )
     known = (few[1] > 0.0) & (more[1] > 0.0)
     assert known.sum() > 500
-    ratio = np.median(few[1][known] / more[1][known])
-    assert ratio == pytest.approx(2.0, rel=0.15)
-    apart = (few[0] - more[0])[known] / np.hypot(few[1], more[1])[known]
-    assert np.sqrt(np.mean(apart**2)) == pytest.approx(1.0, abs=0.2)
+    # Of directions drawn one by one it would be 2.
+    assert np.median(few[1][known] / more[1][known]) > 2.3
+    apart = (few[0] - more[0])[known]
+    doubt = np.hypot(few[1], more[1])[known]
+    ratio = np.sqrt(np.mean(apart**2) / np.mean(doubt**2))
+    assert ratio == pytest.approx(1.0, abs=0.2)
+
+
+def test_what_few_directions_leave_open_is_asked_of_many(monkeypatch):
+    rig = scanner(groove(30.0))
+    merged = reconstruct(rig, seed=0).merged
+    worst = []
+    for seed in (23, 24, 25):
+        monkeypatch.setattr(
+            "planning.verify.reconstruction.check.interreflection._SEED", seed
+        )
+        found = interreflection(rig, merged)
+        assert found.error.max() < 5e-5
+        worst.append(found.record().worst_m)
+    # By few alone they were +0.27, -0.25 and -0.33 mm.
+    assert np.ptp(worst) < 6e-5
 
 
 def test_a_groove_is_warned_of_the_more_the_narrower_and_brighter():
@@ -150,9 +167,12 @@ def test_a_groove_is_warned_of_the_more_the_narrower_and_brighter():
         biased[angle] = found.record().biased
         assert dim.record().biased < biased[angle] or biased[angle] == 0.0
         # Of one bounce all is in proportion, while little moves.
-        far = (np.abs(dim.bias) > 1e-8) & (np.abs(found.bias) < 1e-4)
-        ratio = found.bias[far] / dim.bias[far]
-        assert np.median(ratio) == pytest.approx(10.0, rel=0.15)
+        bright, dark = (
+            shifts(rig, merged.cloud, a, np.random.default_rng(3))[0]
+            for a in (0.8, 0.08)
+        )
+        far = (np.abs(dark) > 1e-8) & (np.abs(bright) < 1e-4)
+        assert np.median(bright[far] / dark[far]) == pytest.approx(10.0, rel=0.15)
         again = interreflection(rig, merged, albedo=0.8)
         np.testing.assert_array_equal(again.bias, found.bias)
         if angle == 30.0:

@@ -19,7 +19,7 @@ from scipy.special import erfinv
 
 from geometry.arrays import lengths
 from geometry.rays.proximity import closest_points
-from geometry.rays.rays import RayCaster
+from geometry.rays.rays import RayCaster, equal_parts
 from planning.model.document.check_records import InterreflectionRecord
 from planning.verify.reconstruction.arrays import Array, Indices, Mask
 from planning.verify.reconstruction.calibration import ProjectorCalibration
@@ -31,8 +31,11 @@ from .merge import Merged
 # What a matt object gives back unless somebody says: sprayed white, or light skin.
 ALBEDO = 0.8
 CELL_M = 0.01
-# Points of a cell that are asked, and directions from each.
-_POINTS, _DIRECTIONS = 40, 16
+# Points of a cell that are asked, and directions from each: few, and where these leave
+# open whether light moves it, many others.
+_POINTS, _FEW, _MANY = 40, 16, 128
+# Spirals of as many directions each, apart from each other; and how they turn.
+_SPIRALS, _GOLDEN = 4, 0.5 * (np.sqrt(5.0) - 1.0)
 _SEED = 23
 # Standard deviations of what random directions leave open.
 _SURELY = 2.0
@@ -40,6 +43,8 @@ _SURELY = 2.0
 _OFF_SURFACE = 1e-5
 # Beyond this share of the direct light an edge is lost rather than moved.
 _MOST = 0.9
+# Rays that are followed at once.
+_AT_ONCE = 1 << 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +64,11 @@ class Interreflection:
     bias: Array
     sigma: Array
     error: Array
+
+    @property
+    def is_open(self) -> Mask:
+        """Cells whose bias may be more than their sigma, shape (n,)."""
+        return np.abs(self.bias) + _SURELY * self.error > self.sigma
 
     @property
     def biased(self) -> Mask:
@@ -100,18 +110,28 @@ def interreflection(
     number = (x * (1 + y.max(initial=0)) + y) * (1 + z.max(initial=0)) + z
     _, cell = np.unique(number, return_inverse=True)
     asked, cell = able[kept := _first(cell, _POINTS)], cell[kept]
-    some = cloud.take(asked)
-    bias, doubt = shifts(plan, some, albedo, rng)
-    known = np.isfinite(bias)
-    some, bias, doubt, cell = some.take(known), bias[known], doubt[known], cell[known]
-    _, cell, count = np.unique(cell, return_inverse=True, return_counts=True)
+    some, noise = cloud.take(asked), merged.sigma[asked]
+    moved, doubt = shifts(plan, some, albedo, rng, _FEW)
+    cells, first = _by_cells(albedo, some, noise, cell, moved, doubt)
+    again = np.isin(cell, cells[first.is_open])
+    moved[again], doubt[again] = shifts(plan, some.take(again), albedo, rng, _MANY)
+    return _by_cells(albedo, some, noise, cell, moved, doubt)[1]
+
+
+def _by_cells(
+    albedo: float, cloud: Cloud, noise: Array, cell: Indices, moved: Array, doubt: Array
+) -> tuple[Indices, Interreflection]:
+    """Return which cells have points that are known to move, and how far they do."""
+    known = np.isfinite(moved)
+    cells, of, count = np.unique(cell[known], return_inverse=True, return_counts=True)
 
     def mean(values: Array) -> Array:
-        return np.bincount(cell, values) / count
+        return np.bincount(of, values[known], len(cells)) / count
 
-    places = np.stack([mean(column) for column in some.points.T], axis=1)
-    noise, error = merged.sigma[asked][known], np.sqrt(mean(doubt**2) / count)
-    return Interreflection(albedo, places, mean(bias), np.sqrt(mean(noise**2)), error)
+    places = np.stack([mean(column) for column in cloud.points.T], axis=1)
+    error = np.sqrt(mean(doubt**2) / count)
+    sigma = np.sqrt(mean(noise**2))
+    return cells, Interreflection(albedo, places, mean(moved), sigma, error)
 
 
 def _first(groups: Indices, most: int) -> Indices:
@@ -127,7 +147,7 @@ def shifts(
     cloud: Cloud,
     albedo: float,
     rng: np.random.Generator,
-    n_directions: int = _DIRECTIONS,
+    n_directions: int = _FEW,
 ) -> tuple[Array, Array]:
     """Return displacements of points along the normal [m]; NaN: in the dark, (n,).
 
@@ -139,34 +159,32 @@ def shifts(
     on = cloud.points - near.distances[:, None] * normals
     moved, doubt = np.full((2, len(cloud)), np.nan)
     for p, projector in enumerate(plan.projectors):
-        rows = np.flatnonzero(cloud.projector == p)
-        if not len(rows):
-            continue
-        x, n = on[rows], normals[rows]
-        bit = projector.pattern.flipping_bit[cloud.ring[rows]]
-        direct = np.clip(projector.incidence_cosine(x, n), 0.0, None)
-        direct = direct * _falloff(projector, x)
-        rays = _cosine_directions(n, n_directions, rng)
-        begin = np.repeat(x + _OFF_SURFACE * mesh.radius * n, n_directions, axis=0)
-        faces, distances = caster.first_hits(begin, rays)
-        hit = np.flatnonzero(faces >= 0)
-        y = begin[hit] + distances[hit, None] * rays[hit]
-        signed = np.zeros(len(begin))
-        signed[hit] = _signed_light(
-            projector,
-            caster,
-            y,
-            mesh.face_normals[faces[hit]],
-            np.repeat(bit, n_directions)[hit],
-        )
-        every = albedo * signed.reshape(len(rows), -1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            share = np.where(direct > 0.0, every.mean(axis=1) / direct, np.nan)
-            vague = every.std(axis=1) / (np.sqrt(n_directions) * direct)
-        share = np.where(np.abs(share) < _MOST, share, np.nan)
-        some = cloud.take(rows)
-        moved[rows] = moved_by(some, n, share)
-        doubt[rows] = np.abs(moved_by(some, n, np.minimum(vague, _MOST)))
+        of = np.flatnonzero(cloud.projector == p)
+        for part in equal_parts(len(of), max(1, _AT_ONCE // n_directions)):
+            rows = of[part]
+            x, n = on[rows], normals[rows]
+            bit = projector.pattern.flipping_bit[cloud.ring[rows]]
+            direct = np.clip(projector.incidence_cosine(x, n), 0.0, None)
+            direct = direct * _falloff(projector, x)
+            rays = _cosine_directions(n, n_directions, rng)
+            begin = np.repeat(x + _OFF_SURFACE * mesh.radius * n, n_directions, axis=0)
+            faces, distances = caster.first_hits(begin, rays)
+            hit = np.flatnonzero(faces >= 0)
+            y = begin[hit] + distances[hit, None] * rays[hit]
+            signed = np.zeros(len(begin))
+            bits, there = (
+                np.repeat(bit, n_directions)[hit],
+                mesh.face_normals[faces[hit]],
+            )
+            signed[hit] = _signed_light(projector, caster, y, there, bits)
+            every = albedo * signed.reshape(len(rows), _SPIRALS, -1).mean(axis=2)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                share = np.where(direct > 0.0, every.mean(axis=1) / direct, np.nan)
+                vague = every.std(axis=1, ddof=1) / (np.sqrt(_SPIRALS) * direct)
+            share = np.where(np.abs(share) < _MOST, share, np.nan)
+            some = cloud.take(rows)
+            moved[rows] = moved_by(some, n, share)
+            doubt[rows] = np.abs(moved_by(some, n, np.minimum(vague, _MOST)))
     return moved, doubt
 
 
@@ -214,10 +232,17 @@ def _falloff(projector: ProjectorCalibration, points: Array) -> Array:
 
 
 def _cosine_directions(normals: Array, n_each: int, rng: np.random.Generator) -> Array:
-    """Directions drawn by their cosine to each normal, (n * n_each, 3)."""
-    every = np.repeat(normals, n_each, axis=0)
-    ball = rng.standard_normal(every.shape)
-    ball /= lengths(ball)[:, None]
+    """Directions drawn by their cosine to each normal, (n * n_each, 3).
+
+    On spirals of the sphere (Fibonacci's), each turned and moved at random.
+    """
+    per = n_each // _SPIRALS
+    moved, turned = rng.random((2, len(normals), _SPIRALS, 1))
+    k = np.arange(per)
+    z = 1.0 - 2.0 * (k + moved) / per
+    phi = 2.0 * np.pi * (k * _GOLDEN + turned)
+    r = np.sqrt(1.0 - z**2)
+    ball = np.stack([r * np.cos(phi), r * np.sin(phi), z], axis=-1).reshape(-1, 3)
     # A point of the unit sphere about the normal's tip is Lambert's law.
-    along = every + 0.999999 * ball
+    along = np.repeat(normals, n_each, axis=0) + 0.999999 * ball
     return along / lengths(along)[:, None]
