@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import wraps
+from inspect import signature
 from itertools import product
 from typing import Any, ParamSpec
 
@@ -90,8 +91,10 @@ def prepare(
 
     Raises:
         InputError: If that is no mesh, or no rig.
+        TypeError: If `plan_rig` has no such option.
     """
     check_values({"mesh": mesh, "rig": rig})
+    signature(pipeline.plan_rig).bind_partial(mesh, rig, **asked)
     return Planner(mesh, rig, cache or Cache.in_memory(), asked)
 
 

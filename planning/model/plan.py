@@ -182,13 +182,13 @@ class RigPlan:
 
     @classmethod
     def load(cls, path: str | Path, *, of_family: bool = False) -> Self:
-        """Read a plan and the surface beside it; a member `of_family` is no family.
+        """Read a plan, by its file or folder; a member `of_family` is no family itself.
 
         Raises:
             PlanFileError: If a file is missing, isn't a plan of a version that is
                 understood, or doesn't belong to the other.
         """
-        path = Path(path)
+        path = Path(path, "plan.json") if Path(path).is_dir() else Path(path)
         with reading(path, PlanFileError):
             content = file_content(path)
         document = _document(content, str(path))

@@ -109,6 +109,8 @@ def test_plans_that_are_raised_or_loaded_are_in_this_form(
 ):
     path = handmade.save(plan, tmp_path)
     assert type(planning.RigPlan.load(path)) is HandedPlan
+    again = planning.RigPlan.load(path.parent)
+    assert again.to_document() == planning.RigPlan.load(path).to_document()
     from planning.handover.planner import _handing
 
     def short():

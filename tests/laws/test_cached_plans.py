@@ -144,6 +144,8 @@ def test_a_prepared_planner_answers_as_plan_rig_does(rig):
 def test_a_plan_of_no_devices_says_which_options_give_some(rig):
     with pytest.raises(InputError, match=r"with max_projectors, or max_heads") as told:
         prepare(box((0.1, 0.06, 0.03)), rig).plan(coverage=0.98)
+    with pytest.raises(TypeError, match="'max_projector'"):
+        prepare(box((0.1, 0.06, 0.03)), rig, max_projector=2)
     assert "\n" not in str(told.value)
 
 

@@ -32,6 +32,7 @@ _DIFFRACTION_M = 0.55e-6
 class Focus:
     """A lens set so that a range of depths is sharp, with the least f-number."""
 
+    focal_m: float
     f_number: float
     distance_m: float
     diffraction_px: float
@@ -176,7 +177,7 @@ class LensFit:
         if not near > focal:
             return None
         stop, distance = optics.least_stop(focal, blur_px * pixel_m, near, far)
-        return Focus(stop, distance, _DIFFRACTION_M * stop / pixel_m)
+        return Focus(focal, stop, distance, _DIFFRACTION_M * stop / pixel_m)
 
     def focused_at_none(self, device: DeviceModel) -> bool:
         """Whether the nearest depth has no image: the focal length is known, longer."""
