@@ -9,7 +9,7 @@ import numpy as np
 
 from geometry.parallel import n_threads
 from planning.model.plan import RigPlan
-from planning.model.words import labelled, percent
+from planning.model.words import labelled, percent, printable
 from planning.report.page.page import PAGE, is_page, pages_of, write_page
 from planning.report.summary.sections import SECTIONS
 from planning.verify.audit.devices.camera_figures import (
@@ -40,7 +40,7 @@ def show_command(options: Mapping[str, Any]) -> int:
         if not lines and not options["all"]:
             lines = [f"{name.upper()}: the plan has nothing of it", ""]
         if lines:
-            click.echo("\n".join(lines))
+            click.echo("\n".join(map(printable, lines)))
     return 0
 
 
@@ -84,7 +84,7 @@ def compare_command(options: Mapping[str, Any]) -> int:
         print_json({"plans": [str(file) for file in files], "rows": found})
         return 0
     names = str(files[0].parent), str(files[1].parent)
-    click.echo("\n".join(comparison_lines(rows, names)))
+    click.echo("\n".join(map(printable, comparison_lines(rows, names))))
     return 0
 
 

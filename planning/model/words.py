@@ -21,17 +21,22 @@ def count_words(count: int, noun: str) -> str:
     return f"{count} {noun}{'s' * (count != 1)}"
 
 
-def one_line(text: str) -> str:
-    """Return words of a stranger's file on one line, and none moves the cursor there.
+def printable(line: str) -> str:
+    """Return a line with what isn't shown, as a control sequence, written out.
 
-    What isn't shown is written out, as a control sequence, which could wipe out lines.
+    In words of a stranger's file it could wipe out other lines.
     """
     return "".join(
         character
         if character.isprintable()
         else character.encode("unicode_escape").decode()
-        for character in " ".join(text.split())
+        for character in line
     )
+
+
+def one_line(text: str) -> str:
+    """Return words of a stranger's file on one line, in which none moves the cursor."""
+    return printable(" ".join(text.split()))
 
 
 def shell_word(path: Path | str) -> str:

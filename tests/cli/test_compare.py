@@ -166,3 +166,15 @@ def test_the_command_prints_both_and_refuses_what_is_no_plan(plan, handmade, tmp
     assert {row["differs"] for row in found["rows"]} == {False}
     (tmp_path / "b" / "plan.json").write_text("{}")
     assert told().exit_code == 3
+
+
+def test_no_name_of_a_plan_wipes_out_lines(handmade, tmp_path):
+    wiping = "cell\x1b[1A\x1b[2K\nnothing\x9b2K"
+    plan = handmade.tampered(
+        handmade.build_plan(), lambda d: d["rig"].update(name=wiping)
+    )
+    path = str(handmade.save(plan, tmp_path))
+    ended = CliRunner().invoke(commands, ["compare", path, path])
+    assert ended.exit_code == 0
+    assert r"cell\x1b[1A" in ended.stdout
+    assert all(line.isprintable() for line in ended.stdout.splitlines())

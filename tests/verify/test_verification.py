@@ -344,7 +344,7 @@ def test_no_name_of_a_plan_wipes_out_what_is_taken_on_trust(handmade):
         handmade.build_plan(), lambda d: d["meshes"][0].update(path=wiping)
     )
     told = verify_plan(plan, check_pixels=False).summary()
-    assert r"--mesh part.obj\x1b[1A" in told
+    assert r"--mesh 'part.obj\x1b[1A" in told
     assert all(line.isprintable() for line in told.splitlines())
 
 
