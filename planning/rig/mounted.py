@@ -131,7 +131,9 @@ def read_mounted(
     Raises:
         InputError: If the file can't be used; of a CSV file it names the line.
     """
-    if Path(path).is_dir() or Path(path).suffix.lower() == ".json":
+    if Path(path).is_dir():
+        path = Path(path) / "plan.json"
+    if Path(path).suffix.lower() == ".json":
         return _of_plan(Path(path), rig, only)
     table = read_csv(path, REQUIRED, OPTIONAL)
     lines: dict[str, int] = {}

@@ -77,7 +77,7 @@ def joint_offer(partial: PartialPlan) -> JointOffer:
     target = scene.target_samples(DRAWS.joint)
     own = JointTables.of(scene, target, partial.projectors, partial.cameras)
     lights = CandidateSet.over(scene, target, partial.stage.candidates.projectors)
-    places = _several_covers(lights.lit)
+    places = several_covers(lights.lit, _OFFERED)
     projectors = with_axes(partial, lights.of(places))
     regions = RegionFloors.of(scene, target)
     reached = lights.reached | np.any(own.lit, axis=1)
@@ -87,7 +87,7 @@ def joint_offer(partial: PartialPlan) -> JointOffer:
     quota = Quotas.of(regions, able, required.coverage)
     sees = _measurable(partial, (*partial.projectors, *projectors[:_LIGHTING]), target)
     views = partial.camera_stage.cover.candidates.cameras
-    cameras = tuple(views[c] for c in _several_covers(sees))
+    cameras = tuple(views[c] for c in several_covers(sees, _OFFERED))
     return JointOffer(
         JointTables.of(
             scene,
@@ -126,16 +126,16 @@ def _measurable(
     return measured
 
 
-def _several_covers(covers: _Mask) -> NDArray[np.int64]:
-    """Return candidates of one greedy cover after the other, `_OFFERED` at most.
+def several_covers(covers: _Mask, count: int) -> NDArray[np.int64]:
+    """Return candidates of one greedy cover after the other, (count,) at most.
 
     Each covers all that candidates cover, less those that covers before have taken.
     """
     left = np.arange(covers.shape[1])
     chosen: list[int] = []
-    while len(chosen) < _OFFERED and len(left):
+    while len(chosen) < count and len(left):
         waiting, before = covers[:, left].any(axis=1), len(chosen)
-        while len(chosen) < _OFFERED and waiting.any():
+        while len(chosen) < count and waiting.any():
             gains = covers[waiting][:, left].sum(axis=0)
             best = int(np.argmax(gains))
             if not gains[best]:
