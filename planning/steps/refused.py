@@ -88,6 +88,8 @@ def _must_be(name: str, value: object) -> str:
     real = isinstance(value, float | np.floating) and not np.isnan(value)
     if name in _NUMBERS and not (real or _whole(value)):
         return "a number"
+    if name == "time_limit" and cast(float, value) <= 0.0:
+        return "more than 0 s"
     return ""
 
 

@@ -30,6 +30,7 @@ NAN = float("nan")
         ("coverage", ["x", NAN, True], "a number"),
         ("accuracy_mm", ["x"], "a number"),
         ("time_limit", ["x", NAN], "a number"),
+        ("time_limit", [0, -1.5], "more than 0 s"),
     ],
 )
 def test_a_wrong_value_is_named_with_what_it_must_be(monkeypatch, name, values, rule):
