@@ -17,7 +17,7 @@ from typing import Any, NoReturn, cast
 import click
 
 from planning.model.progress import Report
-from planning.model.words import one_line, percent_as_share
+from planning.model.words import percent_as_share, printable
 
 _Command = Callable[..., Any]
 # As in sysexits.h: a bug of ours, nothing that the user did.
@@ -162,7 +162,7 @@ def reporter(*, quiet: bool) -> Report:
 
     def report(line: str) -> None:
         if not quiet:
-            click.echo(f"plan: {one_line(line)}", err=True)
+            click.echo(f"plan: {printable(line)}", err=True)
 
     return report
 
@@ -310,4 +310,4 @@ def leave(code: int) -> NoReturn:
 def tell(message: str) -> None:
     """Write a line to stderr for each line of a message."""
     for line in message.splitlines():
-        click.echo(f"plan: {one_line(line)}", err=True)
+        click.echo(f"plan: {printable(' '.join(line.split()))}", err=True)

@@ -2,7 +2,7 @@
 
 import math
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 # Areas below this are told in mm² [m²].
@@ -21,22 +21,17 @@ def count_words(count: int, noun: str) -> str:
     return f"{count} {noun}{'s' * (count != 1)}"
 
 
-def printable(line: str) -> str:
-    """Return a line with what isn't shown, as a control sequence, written out.
+def printable(line: str, is_shown: Callable[[str], bool] = str.isprintable) -> str:
+    """Return a line with characters that aren't shown written out.
 
-    In words of a stranger's file it could wipe out other lines.
+    As a control sequence in words of a stranger's file they could wipe out other lines.
     """
     return "".join(
         character
-        if character.isprintable()
+        if is_shown(character)
         else character.encode("unicode_escape").decode()
         for character in line
     )
-
-
-def one_line(text: str) -> str:
-    """Return words of a stranger's file on one line, in which none moves the cursor."""
-    return printable(" ".join(text.split()))
 
 
 def shell_word(path: Path | str) -> str:

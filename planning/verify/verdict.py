@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from planning.model.words import count_words, one_line
+from planning.model.words import count_words, printable
 from planning.verify.audit.audit import Audit
 from planning.verify.reconstruction.check.result import Reconstruction
 
@@ -112,7 +112,7 @@ class Verification:
             else f"NOT verified: {count_words(len(self.failures), 'failure')}"
         )
         # Names are the file's words: they end no line, and hide none.
-        return "\n".join(one_line(line) for line in lines)
+        return "\n".join(printable(" ".join(line.split())) for line in lines)
 
 
 def _areas_line(name: str, areas: Mapping[str, float], *, alone: bool) -> str:

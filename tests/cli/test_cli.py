@@ -13,6 +13,7 @@ import pytest
 from support.little_work import LITTLE
 
 import planning
+from planning.cli.console import reporter
 from planning.cli.main import main
 from planning.cli.other_commands import write_sample
 from planning.model.plan import InterruptedPlanError, RigPlan
@@ -468,3 +469,8 @@ def test_a_hollow_bust_exits_1_and_says_how_much_why_and_what_helps(tmp_path):
     assert done.stdout.startswith("NOT MET  ")
     assert "HELPS    --target outside leaves out all that lies inside" in done.stdout
     assert (tmp_path / "plan.json").exists()
+
+
+def test_progress_keeps_its_indentation_and_no_control_sequence(capsys):
+    reporter(quiet=False)("  14 regions of part\x1b[2K")
+    assert capsys.readouterr().err == "plan:   14 regions of part\\x1b[2K\n"

@@ -124,7 +124,7 @@ class _Batch:
         """Write the table and the page of what ended so far, in other runs too."""
         with locked(self.out):
             # Another batch may have written since this one began.
-            now = {**self.before, **_before(self.parts, self.out)}
+            now = {**self.before, **_before(read_rows(self.out), self.parts, self.out)}
             ours = {
                 name: beside_plan(row, now.get(name))
                 for name, row in self.rows.items()
@@ -144,7 +144,9 @@ def _keep(files: Mapping[str, bytes], folder: Path) -> None:
             path.write_bytes(content)
 
 
-def _before(parts: Mapping[str, Part], out: Path) -> dict[str, Row]:
+def _before(
+    rows: Mapping[str, Row], parts: Mapping[str, Part], out: Path
+) -> dict[str, Row]:
     """Return the rows of earlier runs: these parts', and others' that still hold.
 
     One holds where no plan is told of, or that plan stands where none of these goes.
@@ -156,7 +158,7 @@ def _before(parts: Mapping[str, Part], out: Path) -> dict[str, Row]:
             return row.folder in ("", parts[row.part].folder)
         return row.failed or (_stands(row, out) and row.folder not in folders)
 
-    return {name: row for name, row in read_rows(out).items() if holds(row)}
+    return {name: row for name, row in rows.items() if holds(row)}
 
 
 def _stands(row: Row, out: Path) -> bool:
@@ -176,9 +178,8 @@ def batch_command(
     # What is wrong with the rig is wrong with every part.
     load_rig(options["rig_name"], options["light"])
     out = Path(options["output"])
-    stand = {
-        row.part: row.folder for row in read_rows(out).values() if _stands(row, out)
-    }
+    rows = read_rows(out)
+    stand = {row.part: row.folder for row in rows.values() if _stands(row, out)}
     parts = {part.name: part for part in find_parts(given, out, stand)}
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -186,7 +187,7 @@ def batch_command(
         raise click.UsageError(f"{out}: can't be written ({error.strerror})") from None
     rig = rig_files(options["rig_name"])
     jobs = options["jobs"] or max(1, n_threads() // 2)
-    threads, before = max(1, n_threads() // jobs), _before(parts, out)
+    threads, before = max(1, n_threads() // jobs), _before(rows, parts, out)
     interrupted = False
     with ExitStack() as stack:
         bar = parts_progress(len(parts), quiet=options["quiet"])

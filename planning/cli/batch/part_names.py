@@ -6,6 +6,8 @@ from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 
+from planning.model.words import printable
+
 # Kinds of characters (Unicode's) that end a line, work a terminal, or aren't text.
 _UNSHOWN = {"Cc", "Cs", "Zl", "Zp"}
 # Those that folders are called by: letters of all alphabets, their marks, numbers.
@@ -19,15 +21,7 @@ _LONGEST = 160
 
 def one_line(text: str) -> str:
     """Return a text that a table or a terminal shows in one line."""
-    return "".join(_escaped(c) if _is_unshown(c) else c for c in text)
-
-
-def _is_unshown(character: str) -> bool:
-    return unicodedata.category(character) in _UNSHOWN
-
-
-def _escaped(character: str) -> str:
-    return character.encode("unicode_escape").decode()
+    return printable(text, lambda c: unicodedata.category(c) not in _UNSHOWN)
 
 
 def told_apart(paths: Sequence[Path], names: Sequence[str]) -> tuple[str, ...]:

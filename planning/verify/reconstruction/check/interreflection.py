@@ -172,11 +172,8 @@ def shifts(
             hit = np.flatnonzero(faces >= 0)
             y = begin[hit] + distances[hit, None] * rays[hit]
             signed = np.zeros(len(begin))
-            bits, there = (
-                np.repeat(bit, n_directions)[hit],
-                mesh.face_normals[faces[hit]],
-            )
-            signed[hit] = _signed_light(projector, caster, y, there, bits)
+            there, bits = mesh.face_normals[faces[hit]], np.repeat(bit, n_directions)
+            signed[hit] = _signed_light(projector, caster, y, there, bits[hit])
             every = albedo * signed.reshape(len(rows), _SPIRALS, -1).mean(axis=2)
             with np.errstate(divide="ignore", invalid="ignore"):
                 share = np.where(direct > 0.0, every.mean(axis=1) / direct, np.nan)
